@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * One panel is drawn in mm with z up, as half a section and its mirror image. Each strain level is
- * one path over all that lies above it, painted over the lower ones, so that no seams show between
- * bands or elements.
+ * One panel is drawn in mm with z up, layer by layer, each as half a section and its mirror image,
+ * which overlap a little on the axis. Each strain level is one path over all that lies above it,
+ * painted over the lower ones. So no seams show between halves, bands or elements.
  */
 #include "solver/section_svg.h"
 
@@ -19,6 +19,16 @@
 /* The colour scale: bands of equal width, the last open to all higher strains. */
 static const double band_width = 0.125;
 enum { BANDS = 12 };
+
+/* What a half is painted with, from the bottom up. */
+enum layer {
+    LAYER_FAT,
+    LAYER_SKIN,
+    LAYER_FIRST_BAND,
+    LAYER_BONE = LAYER_FIRST_BAND + BANDS,
+    LAYER_OUTLINE,
+    LAYER_COUNT
+};
 
 /* The page, in px: the panels' row is as high as the tissue. */
 static const double page_width = 1000, margin = 30, gap = 44;
@@ -221,19 +231,39 @@ static void put_bone(const struct figure *f, const struct panel *p)
 
 /* --- the figure ------------------------------------------------------------------------------- */
 
-static void put_half(const struct figure *f, int s)
+/* What is put between the two calls appears twice: as it is, and mirrored. */
+static void begin_mirrored(const struct figure *f, int s, int layer)
 {
-    const struct panel *p = &f->panel[s];
-    (void)fprintf(f->out, "<g id=\"half%d\" stroke-width=\"0.08\" stroke-linejoin=\"round\">\n", s);
-    for (int t = TISSUE_FAT; t < TISSUE_COUNT; t++) put_tissue(f, p, (enum tissue)t);
-    for (int band = 0; band < BANDS; band++) put_band(f, p, band);
-    put_bone(f, p);
+    (void)fprintf(f->out, "<g id=\"half%d-%d\">\n", s, layer);
+}
+
+static void end_mirrored(const struct figure *f, int s, int layer)
+{
+    (void)fprintf(f->out, "</g>\n<use href=\"#half%d-%d\" transform=\"scale(-1 1)\"/>\n", s, layer);
+}
+
+static void put_outline(const struct figure *f, const struct panel *p)
+{
     (void)fprintf(f->out,
                   "<path fill=\"none\" stroke=\"%s\" stroke-width=\"0.2\" stroke-linecap=\"round\" "
                   "d=\"",
                   ink);
     put_outline_path(f, p);
-    (void)fputs("\"/>\n</g>\n", f->out);
+    (void)fputs("\"/>\n", f->out);
+}
+
+static void put_layer(const struct figure *f, const struct panel *p, int layer)
+{
+    if (layer == LAYER_FAT)
+        put_tissue(f, p, TISSUE_FAT);
+    else if (layer == LAYER_SKIN)
+        put_tissue(f, p, TISSUE_SKIN);
+    else if (layer == LAYER_BONE)
+        put_bone(f, p);
+    else if (layer == LAYER_OUTLINE)
+        put_outline(f, p);
+    else
+        put_band(f, p, layer - LAYER_FIRST_BAND);
 }
 
 /* The contour over both halves: a white border under a black line. */
@@ -265,10 +295,15 @@ static void put_panel(const struct figure *f, int s, double left)
     (void)fprintf(f->out,
                   "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\"/>\n",
                   left, f->seat_y, 2 * half, seat_height_mm * f->px_per_mm, seat_fill);
-    (void)fprintf(f->out, "<g transform=\"translate(%.2f %.2f) scale(%.4f %.4f)\">\n", centre,
-                  f->seat_y, f->px_per_mm, -f->px_per_mm);
-    put_half(f, s);
-    (void)fprintf(f->out, "<use href=\"#half%d\" transform=\"scale(-1 1)\"/>\n", s);
+    (void)fprintf(f->out,
+                  "<g transform=\"translate(%.2f %.2f) scale(%.4f %.4f)\" "
+                  "stroke-width=\"0.08\" stroke-linejoin=\"round\">\n",
+                  centre, f->seat_y, f->px_per_mm, -f->px_per_mm);
+    for (int layer = 0; layer < LAYER_COUNT; layer++) {
+        begin_mirrored(f, s, layer);
+        put_layer(f, p, layer);
+        end_mirrored(f, s, layer);
+    }
     put_threshold(f, s);
     (void)fputs("</g>\n", f->out);
 }

@@ -203,7 +203,7 @@ static void the_drawing_is_whole_and_says_what_it_shows(void **state)
         "muM 8 kPa",
         "F 196 N",
         ">0.75<",
-        "id=\"half1\"",
+        "id=\"half1-0\"",
     };
     static const char *const unwanted[] = {"nan", "inf", "-0.00 ", " -0.00", "e+", "e-0"};
     char *svg = draw();
