@@ -21,13 +21,13 @@ static const char *const element_set[TISSUE_COUNT] = {
 };
 
 /*
- * Contact is by penalty in CalculiX. The normal stiffness lets the skin sink in by about 1 um at the
- * highest seat pressures of a seated person (0.1 MPa); sticking nodes may slide as little.
+ * Contact is by penalty in CalculiX. The normal stiffness lets the skin sink in by 1 um at the
+ * highest pressures under a seated person (0.1 MPa), the stick slope lets it creep by 4 um.
  */
 static const double contact_stiffness_MPa_mm = 100;
 static const double stick_slope_MPa_mm = 10;
 
-/* Young's modulus and Poisson's ratio of the seat's block: without effect, all its nodes are fixed. */
+/* Young's modulus and Poisson's ratio of the seat's block; all its nodes are fixed, so any do. */
 static const double seat_E_MPa = 1000, seat_nu = 0.3;
 
 enum { SEAT_NODES = 8, LINE_NUMBERS_MAX = 12 };
@@ -128,7 +128,7 @@ static bool same_face(const struct mesh *mesh, int face, const int quad[4])
     return found == FACE_CORNERS;
 }
 
-/* Marks, for every node, the seat faces that it is the first node of: first_quad[node], then next. */
+/* Chains the seat faces by their first node: first_quad[node], then next_quad[quad]; -1 ends. */
 static void hang_quads(const struct mesh *mesh, int *first_quad, int *next_quad)
 {
     for (int n = 0; n < mesh->node_count; n++) first_quad[n] = -1;

@@ -17,10 +17,11 @@
  *
  * What the deck says: C3D8 hexahedra in element sets MUSCLE, FAT, SKIN; symmetry on node sets SYMX
  * and SYMY; nodes of set BONE move together in z with one reference node (set BONEREF) and, unless
- * the bone slides, not at all in x and y; the seat is a fixed block (set SEAT) whose top face is the master of a
- * node-to-surface contact with Coulomb friction. The body must start on or above z = 0, touching
- * the seat when driven by a force. Results wanted: displacements (set BODY), forces on BONEREF and
- * SEAT, stresses and Green-Lagrange strains of the body, as text (.dat) and for viewers (.frd).
+ * the bone slides, not at all in x and y; the seat is a fixed block (set SEAT) whose top face is
+ * the master of a node-to-surface contact with Coulomb friction. The body must start on or above
+ * z = 0, touching the seat when driven by a force. Results wanted: displacements (set BODY), total
+ * force on SEAT, stresses and Green-Lagrange strains of the body, as text (.dat) and for viewers
+ * (.frd).
  */
 
 enum inp_drive {
@@ -35,11 +36,9 @@ struct inp_tissue {
 
 struct inp_model {
     struct inp_tissue tissue[TISSUE_COUNT];
-    double alpha; /* of the one-term Ogden law, W = 2 mu / alpha^2 (sum of stretches^alpha - 3) */
-    double
-        friction; /* Coulomb's coefficient; 0 leaves friction out                               */
-    bool
-        bone_slides; /* nodes of BONE are held in z only: uniaxial blocks for verification          */
+    double alpha;     /* W = 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) */
+    double friction;  /* Coulomb's coefficient; 0 leaves friction out           */
+    bool bone_slides; /* BONE is held in z only: uniaxial blocks, for checks    */
     enum inp_drive drive;
     double drive_value;
     const char *title; /* one line, for the reader of the deck */

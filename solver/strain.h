@@ -21,12 +21,13 @@ struct strain_measures {
     double engineering_shear;          /* half of the largest difference of two principal eps */
 };
 
+/* The principal Green-Lagrange strain of a principal stretch, (stretch^2 - 1)/2. */
 double green_lagrange(double stretch);
 
-/* stretch: the principal stretches, largest first, none negative. */
+/* All measures at once. stretch: the principal stretches, largest first, none negative. */
 struct strain_measures strain_measures_of(const double stretch[3]);
 
-/* An element is eight cells, one for each integration point; cell 8 e + q is point q of element e. */
+/* An element is eight cells, one to an integration point; cell 8 e + q is point q of element e. */
 struct strain_cell {
     struct strain_measures strain;
     double volume_mm3; /* unloaded */

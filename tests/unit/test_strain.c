@@ -97,31 +97,38 @@ static void assert_same_strains(const struct strain_field *a, const struct strai
     }
 }
 
+/* The displacement that brings the deformed body x = X + u to Q x + 7. */
+static double *moved_rigidly(const struct mesh *mesh, const double *u, double Q[3][3])
+{
+    double *moved = box_alloc((size_t)mesh->node_count * 3, sizeof *moved);
+    for (int n = 0; n < mesh->node_count; n++) {
+        for (int i = 0; i < 3; i++) {
+            moved[3 * n + i] = 7 - mesh->X_mm[n][i];
+            for (int j = 0; j < 3; j++)
+                moved[3 * n + i] += Q[i][j] * (mesh->X_mm[n][j] + u[3 * n + j]);
+        }
+    }
+    return moved;
+}
+
 static void a_rigid_motion_or_a_reflection_leaves_strain_unchanged(void **state)
 {
     (void)state;
-    static const double Q[2][3][3] = {
+    double Q[2][3][3] = {
         {{0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}}, /* a rotation   */
         {{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}},                      /* a reflection */
     };
     struct mesh mesh = box_mesh(&layered_box);
     double *u = bent(&mesh);
     struct strain_field field = field_of(&mesh, u);
-    double *moved = box_alloc((size_t)mesh.node_count * 3, sizeof *moved);
     for (int k = 0; k < 2; k++) {
-        for (int n = 0; n < mesh.node_count; n++) {
-            for (int i = 0; i < 3; i++) {
-                moved[3 * n + i] = 7 - mesh.X_mm[n][i];
-                for (int j = 0; j < 3; j++)
-                    moved[3 * n + i] += Q[k][i][j] * (mesh.X_mm[n][j] + u[3 * n + j]);
-            }
-        }
+        double *moved = moved_rigidly(&mesh, u, Q[k]);
         struct strain_field moved_field = field_of(&mesh, moved);
         assert_same_strains(&field, &moved_field);
         strain_field_finish(&moved_field);
+        free(moved);
     }
     strain_field_finish(&field);
-    free(moved);
     free(u);
     box_mesh_free(&mesh);
 }
