@@ -103,10 +103,10 @@ static double column_dot(double A[3][3], int p, int q)
 static bool rotate_columns(double A[3][3], int p, int q)
 {
     const double pp = column_dot(A, p, p), qq = column_dot(A, q, q), pq = column_dot(A, p, q);
-    if (!(fabs(pq) > 1e-16 * sqrt(pp * qq))) return false;
-    const double cot_2theta = (qq - pp) / (2 * pq);
-    const double t = copysign(1 / (fabs(cot_2theta) + hypot(1, cot_2theta)), cot_2theta);
-    const double c = 1 / hypot(1, t), s = c * t;
+    if (!(fabs(pq) > 1e-15 * sqrt(pp * qq))) return false;
+    const double cot = (qq - pp) / (2 * pq); /* of twice the angle */
+    const double t = copysign(1 / (fabs(cot) + sqrt(1 + cot * cot)), cot);
+    const double c = 1 / sqrt(1 + t * t), s = c * t;
     for (int i = 0; i < 3; i++) {
         const double a = A[i][p], b = A[i][q];
         A[i][p] = c * a - s * b;
