@@ -205,7 +205,9 @@ static void put_outline_path(const struct figure *f, const struct panel *p)
             enum tissue other = TISSUE_COUNT;
             if ((f->mesh->node_flags[a] & f->mesh->node_flags[b] & axis) == axis) continue;
             if (edge_is_shared(&p->section, q, a, b, &other) && other <= quad->tissue) continue;
-            const struct section_vertex from = vertex_of(f, p, a), to = vertex_of(f, p, b);
+            struct section_vertex from = vertex_of(f, p, a), to = vertex_of(f, p, b);
+            from.at_mm[0] = fmax(from.at_mm[0], 0);
+            to.at_mm[0] = fmax(to.at_mm[0], 0);
             put_line(f->out, &from, &to);
         }
     }
