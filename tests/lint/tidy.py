@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs clang-tidy, configured by .clang-tidy, over every C file that the build compiles.
 
-usage: tidy.py BUILD_DIR   (a build made with either compiler: it needs compile_commands.json)
+usage: tidy.py BUILD_DIR [SOURCE_DIR]   (of a build by either compiler: compile_commands.json)
 """
 import json
 import os
@@ -12,19 +12,21 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parents[2]
 
 
-def compiled_files(build):
+def compiled_files(build, root):
     """The project's own C sources in the build; generated ones are not ours to read."""
     commands = json.loads(Path(build, "compile_commands.json").read_text(encoding="utf-8"))
     paths = {Path(build, c["file"]).resolve() for c in commands}
-    return sorted(p for p in paths if ROOT in p.parents and Path(build).resolve() not in p.parents)
+    return sorted(p for p in paths if root in p.parents and Path(build).resolve() not in p.parents)
 
 
-def warnings_of(build, path):
+def warnings_of(build, root, path):
     # gcc's own options mean nothing to clang.
     done = subprocess.run(["clang-tidy", "--quiet", "-p", build,
+                           f"--config-file={HERE / '.clang-tidy'}",
+                           f"--header-filter={re.escape(str(root))}/(solver|api|server|tests)/.*",
                            "--extra-arg=-Wno-unknown-warning-option",
                            "--extra-arg=-Wno-ignored-optimization-argument", path],
                           capture_output=True, text=True, check=False)
@@ -34,10 +36,11 @@ def warnings_of(build, path):
     return lines
 
 
-def main(build):
-    files = compiled_files(build)
+def main(build, root=HERE):
+    root = Path(root).resolve()
+    files = compiled_files(build, root)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        results = list(pool.map(lambda p: warnings_of(build, p), files))
+        results = list(pool.map(lambda p: warnings_of(build, root, p), files))
     found = sorted({line for lines in results for line in lines})
     print("\n".join(found))
     print(f"{len(files)} files, {len(found)} warnings")
@@ -45,4 +48,4 @@ def main(build):
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(*sys.argv[1:]))
