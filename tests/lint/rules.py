@@ -253,8 +253,7 @@ def docs_name_only_files_that_exist(tree):
         text = re.sub(r"^```.*?^```", lambda m: re.sub(r"[^\n]", " ", m[0]), tree.text(path),
                       flags=re.S | re.M)
         for line, name in mentioned(text):
-            base = PurePosixPath(path).parent if name.startswith(".") else PurePosixPath()
-            target = resolve(base / name)
+            target = resolve(PurePosixPath(name))
             if target.split("/")[0] in folders or "/" not in target:
                 if not exists(tree, target):
                     yield Finding(path, line, f"{name} does not exist")
