@@ -11,11 +11,10 @@
  *        approach D | force F (of the model as meshed, N) | det_F_min J
  */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "solver/newton.h"
 #include "solver/units.h"
+#include "tests/verification/bodies.h"
 
 struct problem {
     const char *name;
@@ -64,10 +63,6 @@ static const struct problem problems[] = {
      .steps = 40},
 };
 
-/* Friction spring of a node: soft against the body it would hide the friction law, and far stiffer
- * than the body it would only cost digits. */
-static const double stick_stiffness_N_mm = 1000;
-
 static const struct problem *find_problem(const char *name)
 {
     for (size_t i = 0; i < sizeof problems / sizeof problems[0]; i++)
@@ -75,61 +70,10 @@ static const struct problem *find_problem(const char *name)
     return NULL;
 }
 
-static void fill_block_nodes(struct mesh *mesh, const struct problem *p)
-{
-    const int *m = p->divisions;
-    int n = 0;
-    for (int k = 0; k <= m[2]; k++)
-        for (int j = 0; j <= m[1]; j++)
-            for (int i = 0; i <= m[0]; i++, n++) {
-                const int at[3] = {i, j, k};
-                for (int c = 0; c < 3; c++)
-                    mesh->X_mm[n][c] = p->size_mm[c] * at[c] / p->divisions[c];
-                mesh->node_flags[n] =
-                    (unsigned char)((i == 0 ? NODE_ON_X0 : 0) | (j == 0 ? NODE_ON_Y0 : 0) |
-                                    (k == 0 ? NODE_ON_SEAT : 0) | (k == m[2] ? p->top_flags : 0));
-            }
-}
-
-static void fill_block_elements(struct mesh *mesh, const int m[3])
-{
-    int e = 0;
-    for (int k = 0; k < m[2]; k++)
-        for (int j = 0; j < m[1]; j++)
-            for (int i = 0; i < m[0]; i++, e++)
-                for (int corner = 0; corner < 8; corner++) {
-                    static const int offset[8][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1},
-                                                     {0, 0}, {1, 0}, {1, 1}, {0, 1}};
-                    const int x = i + offset[corner][0], y = j + offset[corner][1];
-                    mesh->hex[e][corner] = ((k + corner / 4) * (m[1] + 1) + y) * (m[0] + 1) + x;
-                }
-}
-
-static enum ischia_code block_init(struct mesh *ret, const struct problem *p,
-                                   struct ischia_error *err)
-{
-    const int *m = p->divisions;
-    struct mesh mesh = {.node_count = (m[0] + 1) * (m[1] + 1) * (m[2] + 1),
-                        .element_count = m[0] * m[1] * m[2]};
-    mesh.muscle_count = mesh.element_count;
-    mesh.X_mm = calloc((size_t)mesh.node_count, sizeof *mesh.X_mm);
-    mesh.hex = calloc((size_t)mesh.element_count, sizeof *mesh.hex);
-    mesh.tissue = calloc((size_t)mesh.element_count, sizeof *mesh.tissue);
-    mesh.node_flags = calloc((size_t)mesh.node_count, sizeof *mesh.node_flags);
-    if (!mesh.X_mm || !mesh.hex || !mesh.tissue || !mesh.node_flags) {
-        mesh_finish(&mesh);
-        return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the block");
-    }
-    fill_block_nodes(&mesh, p);
-    fill_block_elements(&mesh, m);
-    *ret = mesh;
-    return ISCHIA_OK;
-}
-
 static enum ischia_code problem_mesh(struct mesh *ret, const struct problem *p,
                                      struct ischia_error *err)
 {
-    if (p->size_mm[0] > 0) return block_init(ret, p, err);
+    if (p->size_mm[0] > 0) return block_init(ret, p->size_mm, p->divisions, p->top_flags, err);
     struct ischia_case c = ischia_case_default();
     memcpy(c.param, p->param, sizeof c.param);
     return mesh_local_init(ret, &c, &mesh_divisions[ISCHIA_COARSE], err);
@@ -147,29 +91,6 @@ static void problem_materials(const struct problem *p, struct element_material r
         const double mu = MPa_from_kPa(mu_kPa[t]), kappa = mu * p->bulk_ratio;
         ret[t] = (struct element_material){mu, kappa, kappa};
     }
-}
-
-static void move_bone(const struct mesh *mesh, struct equilibrium *state, double d_mm)
-{
-    state->d_mm = d_mm;
-    for (int n = 0; n < mesh->node_count; n++)
-        if (mesh->node_flags[n] & (NODE_ON_BONE | NODE_ON_PLATE)) state->u_mm[n][2] = -d_mm;
-}
-
-static enum ischia_code walk(struct newton *newton, struct seat *seat, const struct mesh *mesh,
-                             const struct problem *p, struct equilibrium *state,
-                             struct ischia_error *err)
-{
-    const struct newton_control control = {.force_N = 1, .tolerance = 1e-9, .iterations_max = 200};
-    for (int s = 1; s <= p->steps; s++) {
-        struct newton_report report;
-        move_bone(mesh, state, p->d_mm * s / p->steps);
-        TRY(newton_minimise(newton, state, &control, NULL, NULL, &report, err));
-        CHECK(report.reason > 0, err, ISCHIA_E_NUMERIC, "%s: step %d: %s", p->name, s,
-              ischia_reason_name(report.reason));
-        (void)seat_advance(seat, (const double(*)[3])state->u_mm);
-    }
-    return ISCHIA_OK;
 }
 
 static void print_solution(const struct mesh *mesh, const struct body *body,
@@ -192,39 +113,18 @@ static void print_solution(const struct mesh *mesh, const struct body *body,
            body_det_F_min(body, (const double(*)[3])state->u_mm));
 }
 
-/* Everything one solve needs, in the order of its making; finish undoes whatever was made. */
-struct bench {
-    struct mesh mesh;
-    struct body body;
-    struct assembly assembly;
-    struct seat seat;
-    struct newton *newton;
-    struct equilibrium state;
-};
-
 static enum ischia_code bench_run(struct bench *b, const struct problem *p,
                                   struct ischia_error *err)
 {
     struct element_material material[TISSUE_COUNT];
     problem_materials(p, material);
     TRY(problem_mesh(&b->mesh, p, err));
-    TRY(body_init(&b->body, &b->mesh, material, err));
-    TRY(assembly_init(&b->assembly, &b->mesh, err));
-    TRY(seat_init(&b->seat, b->mesh.node_count, p->friction, stick_stiffness_N_mm, err));
-    TRY(newton_create(&b->newton, &b->body, &b->assembly, &b->seat, err));
-    b->state.u_mm = calloc((size_t)b->mesh.node_count, sizeof *b->state.u_mm);
-    CHECK(b->state.u_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the state");
-    return walk(b->newton, &b->seat, &b->mesh, p, &b->state, err);
-}
-
-static void bench_finish(struct bench *b)
-{
-    free(b->state.u_mm);
-    newton_destroy(b->newton);
-    seat_finish(&b->seat);
-    assembly_finish(&b->assembly);
-    body_finish(&b->body);
-    mesh_finish(&b->mesh);
+    TRY(bench_init(b, material, p->friction, err));
+    for (int s = 1; s <= p->steps; s++) {
+        TRY(bench_press(b, p->d_mm * s / p->steps, err));
+        (void)bench_end_step(b);
+    }
+    return ISCHIA_OK;
 }
 
 int main(int argc, char **argv)
