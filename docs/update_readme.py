@@ -3,7 +3,7 @@
 """Runs the commands of README.md's console blocks and writes their output below them.
 
 With --check nothing is written: each block's words must be those of a fresh run, and its numbers
-equal to a relative 1e-3 (another processor may round differently). Times (`1.2 s`) are not compared.
+equal to a relative 1e-3 (another processor may round differently). Times (`1.2 s`) are left out.
 
 usage: update_readme.py [--check]
 """

@@ -2,6 +2,7 @@
 """Reads the tree for the lint rules: its files, C text without comments and strings, functions."""
 import json
 import re
+import shutil
 import subprocess
 from collections import namedtuple
 from functools import lru_cache
@@ -22,6 +23,8 @@ class Tree:
         self.files = sorted(self._git() or self._walk())
 
     def _git(self):
+        if shutil.which("git") is None:
+            return []
         done = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard"],
                               cwd=self.root, capture_output=True, text=True, check=False)
         here = [f for f in done.stdout.splitlines() if (self.root / f).is_file()]

@@ -62,6 +62,8 @@ class Count(unittest.TestCase):
     def test_unittest(self):
         text = "Ran 9 tests in 0.2s\n\nFAILED (failures=1, errors=2, skipped=3)\n"
         self.check([test("FAIL", stderr=text)], "3 passed, 3 failed, 3 skipped", 1)
+        self.check([test("FAIL", stderr="Ran 2 tests in 0.2s\n\nFAILED (failures=5)\n")],
+                   "0 passed, 2 failed, 0 skipped", 1)
         self.check([test(stderr="Ran 1 test in 0.2s\n\nOK\n")], "1 passed, 0 failed, 0 skipped", 0)
 
     def test_a_closing_line_of_our_own_form(self):

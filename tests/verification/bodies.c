@@ -110,25 +110,33 @@ static enum ischia_code apply_step(struct bench *b, double *rhs, struct ischia_e
     return ISCHIA_OK;
 }
 
+/* rhs = share * load - force of the body; returns its norm over that of the load. */
+static double unbalanced(const struct bench *b, const double (*load)[3], double share,
+                         const double (*force)[3], double *rhs)
+{
+    double residual = 0, scale = 0;
+    for (int n = 0; n < b->mesh.node_count; n++)
+        for (int c = 0; c < 3; c++) {
+            const int eq = b->assembly.equation[n][c];
+            if (eq < 0) continue;
+            rhs[eq] = share * load[n][c] - force[n][c];
+            residual += rhs[eq] * rhs[eq];
+            scale += load[n][c] * load[n][c];
+        }
+    return sqrt(residual / scale);
+}
+
 /* Full Newton steps from the present state to equilibrium with share * load. */
 static enum ischia_code load_step(struct bench *b, const double (*load)[3], double share,
                                   struct body_derivatives *work, double *rhs,
                                   struct ischia_error *err)
 {
     for (int iteration = 0; iteration < 30; iteration++) {
-        double residual = 0, scale = 0;
         const double elastic =
             body_energy(&b->body, &b->assembly, (const double(*)[3])b->state.u_mm, 0, work);
         CHECK(elastic < HUGE_VAL, err, ISCHIA_E_NUMERIC, "an element is inverted");
-        for (int n = 0; n < b->mesh.node_count; n++)
-            for (int c = 0; c < 3; c++) {
-                const int eq = b->assembly.equation[n][c];
-                if (eq < 0) continue;
-                rhs[eq] = share * load[n][c] - work->force[n][c];
-                residual += rhs[eq] * rhs[eq];
-                scale += load[n][c] * load[n][c];
-            }
-        if (residual <= 1e-12 * scale) return ISCHIA_OK;
+        if (unbalanced(b, load, share, (const double(*)[3])work->force, rhs) <= 1e-6)
+            return ISCHIA_OK;
         TRY(apply_step(b, rhs, err));
     }
     return FAIL(err, ISCHIA_E_NUMERIC, "no equilibrium at %g of the load", share);

@@ -2,11 +2,11 @@
 """CalculiX as an independent solver: writes decks, runs /usr/bin/ccx, reads what it prints.
 
 What is to know about CalculiX here (version 2.20):
-- *HYPERELASTIC, OGDEN with mu, alpha, D has the energy 2 mu/alpha^2 (sum l^alpha - 3) + (J - 1)^2 / D
-  of the isochoric stretches: mu is the shear modulus, D = 2 / kappa.
+- *HYPERELASTIC, OGDEN with mu, alpha, D has the energy 2 mu/alpha^2 (sum l^alpha - 3) +
+  (J - 1)^2 / D of the isochoric stretches: mu is the shear modulus, D = 2 / kappa.
 - It has no mixed hexahedron. C3D8 integrates everything at 2 x 2 x 2 points, as our element does
-  when the whole bulk modulus acts at the points (element.h: kappa_point = kappa), so that both solve
-  the same discrete equations.
+  when the whole bulk modulus acts at the points (element.h: kappa_point = kappa), so that both
+  solve the same discrete equations.
 - Contact is by penalty: node-to-surface converges, surface-to-surface chatters.
 """
 import os
@@ -35,7 +35,7 @@ def material(name, mu_MPa, kappa_MPa):
 
 
 def mesh(nodes_mm, elements, tissue_of, materials):
-    """Nodes from 1, elements from 1 in VTK order (CalculiX's C3D8 has the same), one set a tissue."""
+    """Nodes from 1, elements from 1 in VTK order (CalculiX's C3D8 too), one set a tissue."""
     text = "*NODE, NSET=ALL\n" + "".join(
         f"{n}, {x:.14g}, {y:.14g}, {z:.14g}\n" for n, (x, y, z) in enumerate(nodes_mm, 1))
     for tissue, (name, mu, kappa) in enumerate(materials):

@@ -33,7 +33,10 @@ class Body:
         self.materials, self.value = [], {}
         for line in text.splitlines():
             key, *words = line.split()
-            getattr(self, "read_" + key, lambda w, k=key: self.value.update({k: float(w[0])}))(words)
+            if hasattr(self, "read_" + key):
+                getattr(self, "read_" + key)(words)
+            else:
+                self.value[key] = float(words[0])
 
     def read_node(self, words):
         numbers = [float(w) for w in words]
@@ -63,7 +66,8 @@ def seat_of(body, number, contact):
     first = len(body.nodes)
     nodes = [(x, y, z) for z in (-0.1 * far, 0) for x, y in corners]
     return nodes, list(range(first, first + 8)), (
-        f"*SURFACE, NAME=FEET_SURFACE, TYPE=NODE\nFEET\n*SURFACE, NAME=SEAT_SURFACE\n{number}, S2\n"
+        "*SURFACE, NAME=FEET_SURFACE, TYPE=NODE\nFEET\n"
+        f"*SURFACE, NAME=SEAT_SURFACE\n{number}, S2\n"
         "*SURFACE INTERACTION, NAME=TOUCH\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n"
         f"{contact[0]}, 1e-9\n{friction_of(body, contact[1])}"
         "*CONTACT PAIR, INTERACTION=TOUCH, TYPE=NODE TO SURFACE\nFEET_SURFACE, SEAT_SURFACE\n")
@@ -80,11 +84,13 @@ def deck_of(body, increment, contact):
     deck = ccx.mesh(body.nodes + seat_nodes, body.hexes + [seat_hex], body.tissue + [3],
                     body.materials + [("SEAT", 10, 100)])
     moved = body.having(ON_BONE | ON_PLATE)
-    sets = {"X0": body.having(ON_X0), "Y0": body.having(ON_Y0), "FEET": [n for n in body.having(ON_SEAT) if body.nodes[n][2] == 0],
+    feet = [n for n in body.having(ON_SEAT) if body.nodes[n][2] == 0]
+    sets = {"X0": body.having(ON_X0), "Y0": body.having(ON_Y0), "FEET": feet,
             "BONE": body.having(ON_BONE), "MOVED": moved, "FIXED": seat_hex}
     deck += "".join(ccx.node_set(name, nodes) for name, nodes in sets.items() if nodes)
-    boundary = "*BOUNDARY\nX0, 1\nY0, 2\nFIXED, 1, 3\n" + ("BONE, 1, 2\n" if sets["BONE"] else "") + \
-        f"MOVED, 3, 3, {-body.value['approach']}\n"
+    boundary = "*BOUNDARY\nX0, 1\nY0, 2\nFIXED, 1, 3\n"
+    boundary += "BONE, 1, 2\n" if sets["BONE"] else ""
+    boundary += f"MOVED, 3, 3, {-body.value['approach']}\n"
     prints = "*NODE PRINT, NSET=MOVED, TOTALS=ONLY, FREQUENCY=100000\nRF\n" \
         "*EL PRINT, ELSET=MUSCLE, FREQUENCY=100000\nE\n"
     return deck + touch + ccx.step(boundary, increment, prints)
@@ -155,8 +161,8 @@ class CalculiX(unittest.TestCase):
         found = (largest_difference(u, body.u) / body.value["approach"],
                  abs(force / body.value["force"] - 1), largest_difference(ours, theirs))
         largest = max(abs(x) for e in ours for x in e)
-        print(f"{problem}: {len(body.hexes)} elements, u differs by {found[0]:.1e} of the approach, "
-              f"force by {found[1]:.1e}, strain by {found[2]:.1e} of up to {largest:.2f}")
+        print(f"{problem}: {len(body.hexes)} elements, u differs by {found[0]:.1e} of the "
+              f"approach, force by {found[1]:.1e}, strain by {found[2]:.1e} of up to {largest:.2f}")
         for value, tolerance in zip(found, tolerances, strict=True):
             self.assertLess(value, tolerance)
 

@@ -37,12 +37,10 @@ static void nominal_stress(const double F[3][3], double ret[3][3])
             for (int j = 0; j < 3; j++) u[n][i] += F[i][j] * cube[n][j];
         }
     assert_true(element_energy(&reference, &soft, u, 0, force, NULL) < HUGE_VAL);
+    memset(ret, 0, 9 * sizeof **ret);
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            ret[i][j] = 0;
-            for (int n = 0; n < HEX_NODES; n++)
-                if (cube[n][j] > 0) ret[i][j] += force[i][n];
-        }
+        for (int j = 0; j < 3; j++)
+            for (int n = 0; n < HEX_NODES; n++) ret[i][j] += cube[n][j] * force[i][n];
 }
 
 static void check(double found, double expected)

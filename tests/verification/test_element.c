@@ -211,7 +211,7 @@ static void exact(const double X[3], double ret_u[3], double ret_F[3][3])
     }
 }
 
-/* Eigenvalues of C = F^T F, F = I + a g^T: 1 in the plane's normal, two from trace and determinant. */
+/* Energy from the eigenvalues of C = F^T F, by Cardano: none of the solver's code. */
 static double energy_density(const double F[3][3])
 {
     double C[3][3], trace = 0, J, sum = 0;
@@ -258,7 +258,7 @@ static void exact_stress(const double F[3][3], double ret[3][3])
         }
 }
 
-/* Trilinear shape function of corner k of a cube of side h, and its gradient, at xi in [-1, 1]^3. */
+/* Trilinear shape function of corner k of a cube of side h and its gradient, xi in [-1, 1]^3. */
 static double shape(int k, const double xi[3], double h, double ret_gradient[3])
 {
     const double sign[3] = {(k + 1) / 2 % 2 ? 1 : -1, k / 2 % 2 ? 1 : -1, k / 4 ? 1 : -1};

@@ -101,8 +101,7 @@ static void sticking_block_is_its_own_mirror_image(void **state)
             assert_true(fabs(low[0] - high[0]) < 2e-3 && fabs(low[1] - high[1]) < 2e-3);
             assert_true(fabs(low[2] + high[2] + 3) < 2e-3);
         }
-    assert_true(b.state.u_mm[2 * plane + 4][0] >
-                0.5); /* it bulges: the comparison means something */
+    assert_true(b.state.u_mm[2 * plane + 4][0] > 0.5); /* it does bulge */
     bench_finish(&b);
 }
 
@@ -120,7 +119,7 @@ static void seat_forces(const struct bench *b, double *ret_tangential, double *r
     free(force);
 }
 
-/* The seat is drawn sideways under a pressed block, by moving the anchors, until all of it slides. */
+/* The seat is drawn sideways under a pressed block, by moving the anchors, until all slides. */
 static void sliding_block_carries_mu_N(void **state)
 {
     (void)state;
