@@ -8,10 +8,10 @@ source deploy/packages.sh
 
 install_packages build
 [[ -f build/release/build.ninja ]] || CC=${CC:-gcc} meson setup build/release --buildtype=release
-ninja -C build/release server/ischia
+ninja -C build/release server/cli/ischia
 
 for side in 1R 7L 9L; do
-  build/release/server/ischia solve --summary "examples/table2_$side.json"
+  build/release/server/cli/ischia solve --summary "examples/table2_$side.json"
   echo
 done
-echo "More: build/release/server/ischia --help; the same numbers as JSON without --summary."
+echo "More: build/release/server/cli/ischia --help; the same numbers as JSON without --summary."

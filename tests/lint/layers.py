@@ -24,10 +24,8 @@ dirent endian fcntl fnmatch getopt glob grp libgen netdb poll pthread pwd regex 
 spawn syslog termios unistd
 arpa/inet net/if netinet/in netinet/tcp
 sys/epoll sys/eventfd sys/file sys/ioctl sys/mman sys/pidfd sys/prctl sys/random sys/resource
-sys/select sys/sendfile sys/signalfd sys/socket sys/stat sys/statvfs sys/syscall sys/time sys/timerfd sys/types
-sys/uio sys/un sys/utsname sys/wait
-gnu/libc-version
-linux/limits
+sys/select sys/sendfile sys/signalfd sys/socket sys/stat sys/statvfs sys/syscall sys/time
+sys/timerfd sys/types sys/uio sys/un sys/utsname sys/wait gnu/libc-version linux/limits
 """.split())
 
 # Every other header: the beginning of the paths that may see it, one file wherever it can be one.
