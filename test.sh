@@ -60,14 +60,14 @@ build() {
 
 logs=() status=0
 # run_suites DIR NAME ARGUMENT...: meson's tests of one build; its log joins the final count.
+# (Meson appends the name of a test setup to the log's.)
 run_suites() {
   local dir=$1 name=$2
   shift 2
-  local log=$dir/meson-logs/count-$name.json
-  rm -f "$log"
+  rm -f "$dir/meson-logs/count-$name"*.json
   echo "== testing $dir: $name"
   meson test -C "$dir" --no-rebuild --print-errorlogs --logbase "count-$name" "$@" || status=1
-  logs+=("$log")
+  logs+=("$dir/meson-logs/count-$name"*.json)
 }
 
 # test_build DIR NAME SUITE...: the chosen suites of one build.
@@ -100,8 +100,8 @@ fi
 if [[ $all == yes && ${#wanted[@]} -eq 0 ]]; then
   build build/other gcc "${sanitize_options[@]}"
   test_build build/other gcc-sanitize unit api
-  build build/valgrind clang --buildtype=debugoptimized
-  run_suites build/valgrind valgrind --setup valgrind --suite unit --no-suite slow
+  build build/valgrind gcc --buildtype=debugoptimized # valgrind 3.19 cannot read clang's DWARF 5
+  run_suites build/valgrind unit --setup valgrind --suite unit --no-suite slow
 fi
 
 /usr/bin/python3 tests/count.py "${logs[@]}" || status=1
