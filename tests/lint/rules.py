@@ -314,8 +314,9 @@ def sources_are_formatted(tree):
 def shell_scripts_stop_at_errors(tree):
     for path in tree.files:
         text = tree.text(path) if path.endswith(".sh") or path == ".ci/run" else ""
-        if text.startswith("#!") and "set -euo pipefail" not in text:
-            yield Finding(path, 1, "shell script without `set -euo pipefail`")
+        wanted = "set -eu\n" if text.startswith("#!/bin/sh") else "set -euo pipefail\n"
+        if text.startswith("#!") and wanted not in text:
+            yield Finding(path, 1, f"shell script without `{wanted.strip()}`")
 
 
 @rule
