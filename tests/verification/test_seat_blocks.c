@@ -110,7 +110,7 @@ static void seat_forces(const struct bench *b, double *ret_tangential, double *r
 {
     double(*force)[3] = calloc((size_t)b->mesh.node_count, sizeof *force);
     assert_non_null(force);
-    seat_add_derivatives(&b->seat, &b->assembly, (const double(*)[3])b->state.u_mm, force, NULL);
+    seat_add_force(&b->seat, b->seat.normal_N, (const double(*)[3])b->state.u_mm, force);
     *ret_tangential = *ret_normal = 0;
     for (int n = 0; n < b->mesh.node_count; n++) {
         *ret_tangential += force[n][0];

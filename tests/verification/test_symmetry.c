@@ -67,20 +67,33 @@ static void mirror_elements(const struct mesh *quarter, int image, int (*number)
     }
 }
 
+/* Likewise for the faces that may touch the seat, whose normals must go on pointing out. */
+static void mirror_seat(const struct mesh *quarter, int image, int (*number)[4], struct mesh *full)
+{
+    const bool turn = image == 1 || image == 2;
+    for (int q = 0; q < quarter->seat_quad_count; q++)
+        for (int k = 0; k < 4; k++)
+            full->seat_quad[image * quarter->seat_quad_count + q][turn ? 3 - k : k] =
+                number[quarter->seat_quad[q][k]][image];
+}
+
 static void mirror_mesh(const struct mesh *quarter, struct mesh *ret)
 {
     int(*number)[4] = calloc((size_t)quarter->node_count, sizeof *number);
     assert_non_null(number);
     *ret = (struct mesh){.node_count = number_images(quarter, number),
-                         .element_count = 4 * quarter->element_count};
+                         .element_count = 4 * quarter->element_count,
+                         .seat_quad_count = 4 * quarter->seat_quad_count};
     ret->X_mm = calloc((size_t)ret->node_count, sizeof *ret->X_mm);
     ret->node_flags = calloc((size_t)ret->node_count, sizeof *ret->node_flags);
     ret->hex = calloc((size_t)ret->element_count, sizeof *ret->hex);
     ret->tissue = calloc((size_t)ret->element_count, sizeof *ret->tissue);
-    assert_true(ret->X_mm && ret->node_flags && ret->hex && ret->tissue);
+    ret->seat_quad = calloc((size_t)ret->seat_quad_count, sizeof *ret->seat_quad);
+    assert_true(ret->X_mm && ret->node_flags && ret->hex && ret->tissue && ret->seat_quad);
     for (int image = 0; image < 4; image++) {
         mirror_nodes(quarter, image, number, ret);
         mirror_elements(quarter, image, number, ret);
+        mirror_seat(quarter, image, number, ret);
     }
     free(number);
 }
