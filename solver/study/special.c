@@ -48,10 +48,26 @@ static double log_gamma(double value)
     return lgamma_r(value, &sign);
 }
 
+/* What Stirling's (z - 1/2) log z - z + log(2 pi)/2 leaves of log Gamma(z), z >= 20. */
+static double stirling_rest(double z)
+{
+    const double w = 1 / (z * z);
+    return (1.0 / 12 - w * (1.0 / 360 - w * (1.0 / 1260 - w / 1680))) / z;
+}
+
+/* -log B(a, b). For large arguments the difference of two log Gammas is taken apart first, or
+ * their leading terms would cancel and leave ten digits at a = 50 000. */
+static double minus_log_beta(double a, double b)
+{
+    const double large = fmax(a, b), small = fmin(a, b);
+    if (large < 20) return log_gamma(a + b) - log_gamma(a) - log_gamma(b);
+    return (large - 0.5) * log1p(small / large) + small * log(a + b) - small +
+           stirling_rest(a + b) - stirling_rest(large) - log_gamma(small);
+}
+
 static double lower_part(double a, double b, double x, double y)
 {
-    const double log_front =
-        a * log(x) + b * log(y) + log_gamma(a + b) - log_gamma(a) - log_gamma(b) - log(a);
+    const double log_front = a * log(x) + b * log(y) + minus_log_beta(a, b) - log(a);
     return exp(log_front) * continued_fraction(a, b, x);
 }
 
