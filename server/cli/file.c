@@ -64,8 +64,8 @@ static void sync_directory_of(const char *path)
 static enum ischia_code write_and_close(FILE *out, const char *path, const char *text,
                                         size_t length, struct ischia_error *err)
 {
-    const bool written = fwrite(text, 1, length, out) == length && fflush(out) == 0 &&
-                         fsync(fileno(out)) == 0;
+    const bool written =
+        fwrite(text, 1, length, out) == length && fflush(out) == 0 && fsync(fileno(out)) == 0;
     const int cause = errno;
     const bool closed = fclose(out) == 0;
     CHECK(written && closed, err, ISCHIA_E_IO, "writing %s failed: %s", path,
@@ -86,8 +86,8 @@ enum ischia_code file_replace(const char *path, const char *text, size_t length,
     char part[PATH_MAX];
     if (path == NULL || strcmp(path, "-") == 0) return write_stdout(text, length, err);
     const int needed = snprintf(part, sizeof part, "%s.part", path);
-    CHECK(needed > 0 && (size_t)needed < sizeof part, err, ISCHIA_E_LIMIT, "the path %s is too long",
-          path);
+    CHECK(needed > 0 && (size_t)needed < sizeof part, err, ISCHIA_E_LIMIT,
+          "the path %s is too long", path);
     FILE *out = fopen(part, "we");
     CHECK(out != NULL, err, ISCHIA_E_IO, "%s cannot be written: %s", part, strerror(errno));
     enum ischia_code code = write_and_close(out, part, text, length, err);

@@ -112,8 +112,7 @@ static enum ischia_code spawn(struct pool *pool, struct worker *w, struct ischia
     if (pid < 0) {
         const int cause = errno;
         (void)close(fd[0]);
-        return FAIL(err, ISCHIA_E_IO, "a worker process could not be started: %s",
-                    strerror(cause));
+        return FAIL(err, ISCHIA_E_IO, "a worker process could not be started: %s", strerror(cause));
     }
     w->pid = pid;
     w->fd = fd[0];
@@ -126,7 +125,8 @@ static int reap(struct worker *w, bool kill_first)
     int status = 0;
     (void)close(w->fd);
     if (kill_first) (void)kill(w->pid, SIGKILL);
-    while (waitpid(w->pid, &status, 0) < 0 && errno == EINTR) {}
+    while (waitpid(w->pid, &status, 0) < 0 && errno == EINTR) {
+    }
     w->pid = 0;
     return status;
 }

@@ -15,9 +15,9 @@
  * process, and the second death is the row's outcome. The processes end with their parent.
  */
 struct rows_outcome {
-    enum ischia_code code;        /* ISCHIA_OK: result is filled, converged or not           */
-    struct ischia_error error;    /* when code is not ISCHIA_OK (ISCHIA_E_STATE: died twice) */
-    struct ischia_result result;  /* with wall_s and cpu_s                                   */
+    enum ischia_code code;       /* ISCHIA_OK: result is filled, converged or not           */
+    struct ischia_error error;   /* when code is not ISCHIA_OK (ISCHIA_E_STATE: died twice) */
+    struct ischia_result result; /* with wall_s and cpu_s                                   */
 };
 
 struct rows_task {

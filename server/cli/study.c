@@ -46,8 +46,8 @@ int command_study(int argc, char **argv)
 int study_failed(const char *what, const struct ischia_error *err)
 {
     (void)fprintf(stderr, "ischia study %s: %s\n", what, err->message);
-    const bool bad_input = err->code == ISCHIA_E_INPUT || err->code == ISCHIA_E_STATE ||
-                           err->code == ISCHIA_E_LIMIT;
+    const bool bad_input =
+        err->code == ISCHIA_E_INPUT || err->code == ISCHIA_E_STATE || err->code == ISCHIA_E_LIMIT;
     return bad_input ? EXIT_BAD_INPUT : EXIT_SOLVE_FAILED;
 }
 

@@ -21,10 +21,12 @@ static const char usage[] =
     "       ischia study factorial DESIGN.json --points [-o POINTS.csv]\n";
 static const char help[] =
     "\nSolves every point of a design: one row of OUT.csv for each, with status and reason.\n"
-    "\n  -o, --output FILE  the result file; FILE.journal keeps finished rows while it runs, so the\n"
+    "\n  -o, --output FILE  the result file; FILE.journal keeps finished rows while it runs, so "
+    "the\n"
     "                     same command goes on where it was stopped, even by kill -9\n"
     "  -j, --jobs N       solve N rows at a time (default: one a processor)\n"
-    "      --shard I/N    solve rows I, I+N, I+2N, ... only; `ischia study merge` joins the shards\n"
+    "      --shard I/N    solve rows I, I+N, I+2N, ... only; `ischia study merge` joins the "
+    "shards\n"
     "      --points       write the points and solve nothing\n"
     "  -q, --quiet        no progress on stderr\n"
     "\nExit status: 0 every row succeeded, 1 some did not (see their reason), 2 bad input.\n";
@@ -81,24 +83,39 @@ static bool parse_jobs(const char *text, struct arguments *a)
 /* False: the usage is wrong. *ret_help: only help was asked for. */
 static bool parse_arguments(int argc, char **argv, struct arguments *a, bool *ret_help)
 {
-    static const struct option options[] = {
-        {"output", required_argument, NULL, 'o'}, {"jobs", required_argument, NULL, 'j'},
-        {"shard", required_argument, NULL, 's'},  {"points", no_argument, NULL, 'p'},
-        {"quiet", no_argument, NULL, 'q'},        {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0}};
+    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
+                                            {"jobs", required_argument, NULL, 'j'},
+                                            {"shard", required_argument, NULL, 's'},
+                                            {"points", no_argument, NULL, 'p'},
+                                            {"quiet", no_argument, NULL, 'q'},
+                                            {"help", no_argument, NULL, 'h'},
+                                            {NULL, 0, NULL, 0}};
     bool good = true;
     *a = (struct arguments){.jobs = rows_processes_default(), .shards = 1};
     *ret_help = false;
     optind = 0;
     for (int c; good && (c = getopt_long(argc, argv, "o:j:qh", options, NULL)) != -1;) {
         switch (c) {
-        case 'o': a->output = optarg; break;
-        case 'j': good = parse_jobs(optarg, a); break;
-        case 's': good = parse_shard(optarg, a); break;
-        case 'p': a->points = true; break;
-        case 'q': a->quiet = true; break;
-        case 'h': *ret_help = true; return true;
-        default: good = false;
+        case 'o':
+            a->output = optarg;
+            break;
+        case 'j':
+            good = parse_jobs(optarg, a);
+            break;
+        case 's':
+            good = parse_shard(optarg, a);
+            break;
+        case 'p':
+            a->points = true;
+            break;
+        case 'q':
+            a->quiet = true;
+            break;
+        case 'h':
+            *ret_help = true;
+            return true;
+        default:
+            good = false;
         }
     }
     if (!good || optind + 1 != argc) return false;

@@ -76,7 +76,8 @@ static enum ischia_code load_line(struct study_journal *journal, char *line, siz
     return keep(journal, row, text, err);
 }
 
-static enum ischia_code write_all(int fd, const char *bytes, size_t length, struct ischia_error *err)
+static enum ischia_code write_all(int fd, const char *bytes, size_t length,
+                                  struct ischia_error *err)
 {
     while (length > 0) {
         const ssize_t written = write(fd, bytes, length);
@@ -148,8 +149,8 @@ enum ischia_code study_journal_open(struct study_journal *ret, const char *path,
     if (journal.text == NULL) {
         code = FAIL(err, ISCHIA_E_MEMORY, "no memory for %zu rows", rows);
     } else if (flock(journal.fd, LOCK_EX | LOCK_NB) != 0) {
-        code = FAIL(err, ISCHIA_E_STATE, "another process is running this study (%s is taken)",
-                    path);
+        code =
+            FAIL(err, ISCHIA_E_STATE, "another process is running this study (%s is taken)", path);
     } else {
         code = load(&journal, path, header, err);
         if (code == ISCHIA_OK) code = end_last_line(journal.fd, err);

@@ -76,8 +76,9 @@ static enum ischia_code write_merged(struct merge *m, const char *path, struct i
         missing++;
         first = row + 1;
     }
-    CHECK(missing == 0, err, ISCHIA_E_INPUT, "%zu of %zu rows are in no shard, the first is row %zu",
-          missing, m->plan.points.count, first);
+    CHECK(missing == 0, err, ISCHIA_E_INPUT,
+          "%zu of %zu rows are in no shard, the first is row %zu", missing, m->plan.points.count,
+          first);
     text_out_init(&out);
     text_put_string(&out, m->header);
     for (size_t row = 0; row < m->plan.points.count; row++) {

@@ -57,9 +57,8 @@ static void refuse_unknown(const struct reader *in, const char *const *known)
         const char *const *k = known;
         while (*k != NULL && strcmp(*k, json_key(m)) != 0) k++;
         if (*k != NULL) continue;
-        doc_faults_add(in->faults,
-                       doc_pointer(pointer, sizeof pointer, in->pointer, json_key(m)), "unknown",
-                       "%s is not a key here", json_key(m));
+        doc_faults_add(in->faults, doc_pointer(pointer, sizeof pointer, in->pointer, json_key(m)),
+                       "unknown", "%s is not a key here", json_key(m));
     }
 }
 
@@ -193,8 +192,8 @@ static void read_kind(const struct reader *in, struct design *d)
 
 static void read_rule(const struct reader *plan, struct design *d)
 {
-    static const char *const known[] = {"kind",   "fraction", "axial",  "points", "skip",
-                                        "seed",   "paths",    "levels", NULL};
+    static const char *const known[] = {"kind", "fraction", "axial",  "points", "skip",
+                                        "seed", "paths",    "levels", NULL};
     const struct json *object = member_of_type(plan, "design", JSON_OBJECT);
     const struct reader in = {object, "/design", plan->faults};
     double axial = 1, points = 0, skip = 0, seed = 0, paths = 0, levels = 4;
@@ -226,7 +225,7 @@ static bool is_missing_factor(const struct ischia_fault *fault, const struct des
     if (strcmp(fault->code, "missing") != 0) return false;
     for (int f = 0; f < d->factor_count; f++)
         if (!d->factor[f].is_option &&
-            strcmp(fault->pointer + strlen("/case/"), ischia_params[d->factor[f].index].key) == 0)
+            strcmp(fault->pointer + 1, ischia_params[d->factor[f].index].key) == 0)
             return true;
     return false;
 }
@@ -238,17 +237,19 @@ static void read_base(const struct reader *in, struct design *d)
     const struct json *object = member_of_type(in, "case", JSON_OBJECT);
     ischia_request_init(&request);
     doc_faults_init(&found);
-    if (object != NULL) case_doc_read_value(&request, object, "/case", &found);
+    if (object != NULL) case_doc_read_value(&request, object, &found);
     d->base = request.values;
-    for (size_t i = 0; i < found.count; i++)
+    for (size_t i = 0; i < found.count; i++) {
+        char pointer[64];
+        (void)snprintf(pointer, sizeof pointer, "/case%s", found.item[i].pointer);
         if (!is_missing_factor(&found.item[i], d))
-            doc_faults_add(in->faults, found.item[i].pointer, found.item[i].code, "%s",
-                           found.item[i].detail);
+            doc_faults_add(in->faults, pointer, found.item[i].code, "%s", found.item[i].detail);
+    }
     for (int p = 0; object == NULL && p < ISCHIA_PARAM_COUNT; p++) {
         struct ischia_fault fault = {.code = "missing"};
-        (void)snprintf(fault.pointer, sizeof fault.pointer, "/case/%s", ischia_params[p].key);
+        (void)snprintf(fault.pointer, sizeof fault.pointer, "/%s", ischia_params[p].key);
         if (!is_missing_factor(&fault, d))
-            doc_faults_add(in->faults, fault.pointer, "missing",
+            doc_faults_add(in->faults, "/case", "missing",
                            "%s is not a factor, so \"case\" must give it", ischia_params[p].key);
     }
 }
@@ -294,10 +295,9 @@ static void read_plan(const struct json *root, struct study_plan *plan, struct d
     read_base(&in, &plan->design);
     read_responses(&in, plan);
     if (faults->count == 0 && !design_is_valid(&plan->design))
-        doc_faults_add(faults, "/design", "missing", "%s needs %s",
-                       design_kind_names[plan->design.kind],
-                       plan->design.kind == DESIGN_MORRIS ? "\"paths\" and an even \"levels\""
-                                                          : "\"points\"");
+        doc_faults_add(
+            faults, "/design", "missing", "%s needs %s", design_kind_names[plan->design.kind],
+            plan->design.kind == DESIGN_MORRIS ? "\"paths\" and an even \"levels\"" : "\"points\"");
 }
 
 static void put_faults(struct text_out *out, const struct doc_faults *faults)
