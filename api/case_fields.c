@@ -94,6 +94,13 @@ const char *case_doc_column_key(const char *column)
     return strcmp(mark + 1, ischia_params[found].unit) == 0 ? case_key_name(found) : NULL;
 }
 
+/* "skin.thick" of "skin.thickness". */
+static bool is_beginning(const char *name, const char *key)
+{
+    const size_t length = strlen(name);
+    return length >= 4 && strncmp(name, key, length) == 0;
+}
+
 const char *case_doc_nearest_key(const char *key)
 {
     char buffer[8];
@@ -102,6 +109,7 @@ const char *case_doc_nearest_key(const char *key)
     for (size_t i = 0; i < sizeof synonyms / sizeof synonyms[0]; i++)
         if (text_distance(name, synonyms[i].word) == 0) return synonyms[i].key;
     for (int i = 0; i < KEY_COUNT; i++) {
+        if (is_beginning(name, case_key_name(i))) return case_key_name(i);
         const int distance = text_distance(name, case_key_name(i));
         if (distance >= least) continue;
         least = distance;

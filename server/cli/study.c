@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "server/cli/study.h"
 
+#include <errno.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/cli/file.h"
+#include "server/cli/files.h"
 
 struct sub_command {
     const char *name;
@@ -59,10 +61,16 @@ int study_usage(const char *what, const char *usage)
 
 enum ischia_code study_write(struct text_out *text, const char *path, struct ischia_error *err)
 {
+    struct file_out out;
     char *bytes;
     size_t length;
     TRY(text_out_take(text, &bytes, &length, err));
-    const enum ischia_code code = file_replace(path, bytes, length, err);
+    enum ischia_code code = file_out_open(&out, path != NULL ? path : "-", err);
+    if (code == ISCHIA_OK) {
+        if (fwrite(bytes, 1, length, out.stream) != length)
+            code = FAIL(err, ISCHIA_E_IO, "cannot write %s: %s", out.path, strerror(errno));
+        code = file_out_close(&out, code, err);
+    }
     free(bytes);
     return code;
 }

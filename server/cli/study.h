@@ -12,9 +12,6 @@ int study_merge(int argc, char **argv);
 int study_emulate(int argc, char **argv);
 int study_compare(int argc, char **argv);
 
-/* `ischia study ...`: what ischia.c's table calls. */
-int command_study(int argc, char **argv);
-
 /* Prints "ischia study WHAT: message" on stderr and returns the exit status for the error's code. */
 int study_failed(const char *what, const struct ischia_error *err);
 

@@ -6,12 +6,15 @@
  */
 #include <getopt.h>
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
+#include <unistd.h>
 
-#include "server/cli/progress.h"
-#include "server/cli/rows.h"
+#include "server/cli/bar.h"
+#include "server/cli/crew.h"
 #include "server/cli/study.h"
 #include "server/cli/study_journal.h"
 #include "server/cli/study_plan.h"
@@ -43,11 +46,21 @@ struct study {
     const struct arguments *arguments;
     struct study_plan plan;
     struct study_journal journal;
-    struct progress progress;
+    struct crew crew;
+    bool *died; /* [points.count] the process that solved this row died once */
     size_t next_row;
-    size_t total, done, failed; /* of this shard */
-    struct ischia_error error;  /* of a refused row that could not be written */
+    size_t total, done, failed; /* of this shard                  */
+    size_t before;              /* done by an earlier run         */
+    struct bar bar;
+    double start_s, shown_s;
 };
+
+static int processors(void)
+{
+    const long online = sysconf(_SC_NPROCESSORS_ONLN);
+    if (online < 1) return 1;
+    return online > CREW_MEMBERS_MAX ? CREW_MEMBERS_MAX : (int)online;
+}
 
 static bool parse_whole(const char *text, long min, long max, char stop, const char **ret_end,
                         long *ret)
@@ -75,7 +88,7 @@ static bool parse_jobs(const char *text, struct arguments *a)
 {
     const char *end;
     long jobs;
-    if (!parse_whole(text, 1, ROWS_PROCESSES_MAX, '\0', &end, &jobs)) return false;
+    if (!parse_whole(text, 1, CREW_MEMBERS_MAX, '\0', &end, &jobs)) return false;
     a->jobs = (int)jobs;
     return true;
 }
@@ -91,7 +104,7 @@ static bool parse_arguments(int argc, char **argv, struct arguments *a, bool *re
                                             {"help", no_argument, NULL, 'h'},
                                             {NULL, 0, NULL, 0}};
     bool good = true;
-    *a = (struct arguments){.jobs = rows_processes_default(), .shards = 1};
+    *a = (struct arguments){.jobs = processors(), .shards = 1};
     *ret_help = false;
     optind = 0;
     for (int c; good && (c = getopt_long(argc, argv, "o:j:qh", options, NULL)) != -1;) {
@@ -134,11 +147,75 @@ static void count_row(struct study *s, const char *text)
     if (strncmp(text, "succeeded,", strlen("succeeded,")) != 0) s->failed++;
 }
 
-static void tick(void *context)
+/* ---- progress ---- */
+
+static double now_s(void)
 {
-    struct study *s = context;
-    progress_show(&s->progress, s->done, s->failed);
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
+
+/* "1 h 05 min", "3 min 10 s", "8 s". */
+static void duration_words(double seconds, char *ret, size_t size)
+{
+    const long s = lround(seconds);
+    if (s >= 3600) {
+        (void)snprintf(ret, size, "%ld h %02ld min", s / 3600, s / 60 % 60);
+    } else if (s >= 60) {
+        (void)snprintf(ret, size, "%ld min %02ld s", s / 60, s % 60);
+    } else {
+        (void)snprintf(ret, size, "%ld s", s);
+    }
+}
+
+static void state_words(const struct study *s, char *ret, size_t size)
+{
+    char time[32] = "", without[48] = "";
+    const double elapsed = now_s() - s->start_s;
+    const bool finished = s->done == s->total;
+    const double left = elapsed / (double)(s->done - s->before + (s->done == s->before)) *
+                        (double)(s->total - s->done);
+    duration_words(finished ? elapsed : left, time, sizeof time);
+    if (s->failed > 0) (void)snprintf(without, sizeof without, ", %zu without result", s->failed);
+    (void)snprintf(ret, size, "%zu/%zu rows%s, %s%s%s", s->done, s->total, without,
+                   finished ? "took " : "about ", time, finished ? "" : " left");
+}
+
+/* A bar on a terminal; elsewhere a line every ten seconds, so that a log stays readable. */
+static void show_progress(struct study *s)
+{
+    char words[160];
+    const double now = now_s(), pause = s->bar.shown ? 0.2 : 10;
+    if (s->arguments->quiet || s->done == s->before || now - s->shown_s < pause) return;
+    s->shown_s = now;
+    state_words(s, words, sizeof words);
+    if (s->bar.shown) {
+        bar_draw(&s->bar, (double)s->done / (double)s->total, words);
+    } else {
+        (void)fprintf(stderr, "%s\n", words);
+    }
+}
+
+static void start_progress(struct study *s)
+{
+    bar_init(&s->bar);
+    s->before = s->done;
+    s->start_s = s->shown_s = now_s();
+    if (s->done > 0 && !s->arguments->quiet)
+        (void)fprintf(stderr, "%zu of %zu rows are there from an earlier run\n", s->done, s->total);
+}
+
+static void end_progress(struct study *s)
+{
+    char words[160];
+    if (s->arguments->quiet) return;
+    bar_clear(&s->bar);
+    state_words(s, words, sizeof words);
+    (void)fprintf(stderr, "%s\n", words);
+}
+
+/* ---- rows ---- */
 
 static enum ischia_code add_row(struct study *s, size_t row, double wall_s, struct text_out *text,
                                 struct ischia_error *err)
@@ -151,44 +228,54 @@ static enum ischia_code add_row(struct study *s, size_t row, double wall_s, stru
     return code;
 }
 
-static enum ischia_code row_done(void *context, size_t row, const struct rows_outcome *outcome,
-                                 struct ischia_error *err)
+/* A row whose process died (killed for memory, say) is solved once more before it fails. */
+static enum ischia_code row_answered(struct study *s, const struct crew_answer *answer,
+                                     struct ischia_error *err)
 {
-    struct study *s = context;
+    const size_t row = (size_t)answer->job;
     struct text_out text;
-    if (outcome->code == ISCHIA_E_MEMORY)
-        return FAIL(err, ISCHIA_E_MEMORY, "row %zu: %s; use fewer processes (-j)", row + 1,
-                    outcome->error.message);
+    CHECK(answer->code != ISCHIA_E_MEMORY, err, ISCHIA_E_MEMORY,
+          "row %zu: %.400s; use fewer processes (-j)", row + 1, answer->message);
+    if (answer->code == ISCHIA_E_STATE && !s->died[row]) {
+        const struct ischia_case c = design_case(&s->plan.design, &s->plan.points, row);
+        s->died[row] = true;
+        return crew_give(&s->crew, answer->job, &c, err);
+    }
     text_out_init(&text);
-    study_response_put(&text, outcome, s->plan.response, s->plan.response_count);
-    const double wall_s = outcome->code == ISCHIA_OK ? outcome->result.numerics.wall_s : 0;
-    return add_row(s, row, wall_s, &text, err);
+    study_response_put(&text, answer, s->plan.response, s->plan.response_count);
+    return add_row(s, row, answer->result.numerics.wall_s, &text, err);
 }
 
 /* A point that is not a valid case is a row too: refused, with the reason. */
-static bool refuse(struct study *s, size_t row, const struct ischia_case *c)
+static enum ischia_code refuse(struct study *s, size_t row, const struct ischia_case *c,
+                               struct ischia_error *err)
 {
     struct text_out text;
     text_out_init(&text);
     study_response_put_refused(&text, c, s->plan.response_count);
-    return add_row(s, row, 0, &text, &s->error) == ISCHIA_OK;
+    return add_row(s, row, 0, &text, err);
 }
 
-static bool next_row(void *context, size_t *ret_row, struct ischia_case *ret_case)
+static enum ischia_code give_row(struct study *s, size_t row, struct ischia_error *err)
 {
-    struct study *s = context;
-    for (; s->next_row < s->plan.points.count; s->next_row++) {
-        const size_t row = s->next_row;
-        if (!in_shard(s, row) || s->journal.text[row] != NULL) continue;
-        *ret_case = design_case(&s->plan.design, &s->plan.points, row);
-        if (ischia_case_is_valid(ret_case)) {
-            *ret_row = row;
-            s->next_row++;
-            return true;
-        }
-        if (!refuse(s, row, ret_case)) return false;
-    }
-    return false;
+    if (!in_shard(s, row) || s->journal.text[row] != NULL) return ISCHIA_OK;
+    const struct ischia_case c = design_case(&s->plan.design, &s->plan.points, row);
+    if (!ischia_case_is_valid(&c)) return refuse(s, row, &c, err);
+    return crew_give(&s->crew, (long)row, &c, err);
+}
+
+static enum ischia_code work_through(struct study *s, struct ischia_error *err)
+{
+    static struct crew_answer answer; /* large, and there is one study in a process */
+    do {
+        while (s->next_row < s->plan.points.count && crew_has_idle(&s->crew))
+            TRY(give_row(s, s->next_row++, err));
+        if (!crew_is_working(&s->crew)) break;
+        TRY(crew_wait(&s->crew, &answer, err));
+        TRY(row_answered(s, &answer, err));
+        show_progress(s);
+    } while (true);
+    return ISCHIA_OK;
 }
 
 static void count_finished(struct study *s)
@@ -216,21 +303,17 @@ static enum ischia_code write_result(struct study *s, struct ischia_error *err)
 
 static enum ischia_code solve_rows(struct study *s, struct ischia_error *err)
 {
-    const struct rows_task task = {.processes = s->arguments->jobs,
-                                   .context = s,
-                                   .next = next_row,
-                                   .done = row_done,
-                                   .tick = tick};
     count_finished(s);
-    if (s->done > 0 && !s->arguments->quiet)
-        (void)fprintf(stderr, "%zu of %zu rows are there from an earlier run\n", s->done, s->total);
-    progress_init(&s->progress, stderr, "rows", s->total, s->done, s->arguments->quiet);
-    TRY(rows_solve(&task, err));
-    if (s->error.code != ISCHIA_OK) {
-        *err = s->error;
-        return s->error.code;
+    start_progress(s);
+    s->died = calloc(s->plan.points.count + 1, sizeof *s->died);
+    CHECK(s->died != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows", s->plan.points.count);
+    if (s->done < s->total) {
+        TRY(crew_start(&s->crew, s->arguments->jobs, err));
+        const enum ischia_code code = work_through(s, err);
+        crew_stop(&s->crew);
+        TRY(code);
     }
-    progress_finish(&s->progress, s->done, s->failed);
+    end_progress(s);
     return write_result(s, err);
 }
 
@@ -244,6 +327,7 @@ static enum ischia_code run_study(struct study *s, struct ischia_error *err)
                            s->plan.points.count, err));
     const enum ischia_code code = solve_rows(s, err);
     study_journal_close(&s->journal);
+    free(s->died);
     return code;
 }
 

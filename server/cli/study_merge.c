@@ -8,11 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/cli/file.h"
+#include "server/cli/files.h"
 #include "server/cli/study.h"
 #include "server/cli/study_plan.h"
 
-enum { SHARD_BYTES_MAX = 1 << 30 };
+enum { SHARD_BYTES_MAX = 1 << 28 };
 
 static const char usage[] = "usage: ischia study merge DESIGN.json SHARD.csv... -o OUT.csv\n";
 

@@ -10,7 +10,7 @@
 #include "api/case_doc.h"
 #include "api/csv.h"
 #include "api/json.h"
-#include "server/cli/file.h"
+#include "server/cli/files.h"
 
 static const struct json_limits plan_limits = {1024 * 1024, 16, 4096};
 

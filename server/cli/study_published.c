@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "api/json.h"
-#include "server/cli/file.h"
+#include "server/cli/files.h"
 
 static const struct json_limits published_limits = {1024 * 1024, 8, 256};
 

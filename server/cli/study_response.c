@@ -66,31 +66,30 @@ static void put_reason(struct text_out *out, const char *word, const char *detai
     csv_put_text(out, text_printable(reason, printable, sizeof printable), false);
 }
 
-static void put_numbers(struct text_out *out, const struct rows_outcome *outcome, const int *chosen,
+static void put_numbers(struct text_out *out, const struct crew_answer *answer, const int *chosen,
                         int count)
 {
-    const bool solved = outcome->code == ISCHIA_OK;
+    const bool solved = answer->code == ISCHIA_OK;
     for (int i = 0; i < count; i++) {
         const struct study_response *response = &study_responses[chosen[i]];
-        const bool meant =
-            solved && (response->always || ischia_result_converged(&outcome->result));
-        csv_put_number(out, meant ? value_of(response, &outcome->result) : (double)NAN, false);
+        const bool meant = solved && (response->always || ischia_result_converged(&answer->result));
+        csv_put_number(out, meant ? value_of(response, &answer->result) : (double)NAN, false);
     }
 }
 
-void study_response_put(struct text_out *out, const struct rows_outcome *outcome, const int *chosen,
+void study_response_put(struct text_out *out, const struct crew_answer *answer, const int *chosen,
                         int count)
 {
-    const struct ischia_numerics *numerics = &outcome->result.numerics;
-    const bool solved = outcome->code == ISCHIA_OK;
-    const bool succeeded = solved && ischia_result_converged(&outcome->result);
+    const struct ischia_numerics *numerics = &answer->result.numerics;
+    const bool solved = answer->code == ISCHIA_OK;
+    const bool succeeded = solved && ischia_result_converged(&answer->result);
     csv_put_text(out, succeeded ? "succeeded" : "failed", true);
     if (solved) {
         put_reason(out, ischia_reason_name(numerics->reason), succeeded ? "" : numerics->detail);
     } else {
-        put_reason(out, ischia_code_name(outcome->code), outcome->error.message);
+        put_reason(out, ischia_code_name(answer->code), answer->message);
     }
-    put_numbers(out, outcome, chosen, count);
+    put_numbers(out, answer, chosen, count);
 }
 
 void study_response_put_refused(struct text_out *out, const struct ischia_case *c, int count)

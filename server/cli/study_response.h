@@ -6,7 +6,7 @@
 #include <stddef.h>
 
 #include "api/text.h"
-#include "server/cli/rows.h"
+#include "server/cli/crew.h"
 #include "solver/case.h"
 #include "solver/result.h"
 
@@ -28,7 +28,7 @@ int study_response_find(const char *name); /* -1: no such response */
 
 /* "status,reason,value,..." of one row, no line end. Not converged: the numbers that need a
  * converged state stay empty. */
-void study_response_put(struct text_out *out, const struct rows_outcome *outcome, const int *chosen,
+void study_response_put(struct text_out *out, const struct crew_answer *answer, const int *chosen,
                         int count);
 
 /* The same for a case that was never solved because it is not valid. */

@@ -1,91 +1,88 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Stands in for the mechanics behind solver/solver.h where a test is about what happens around a
- * solve: a known polynomial instead of a finite element model, in microseconds. Programs linked
- * with it say so ("double" in numerics.detail would be in any failure's reason).
+ * A stand-in for the solver, for tests of what is around it. It computes no mechanics: its numbers
+ * are arithmetic on the inputs, repeatable to the bit, and the force says how a solve is to end.
  *
- * In x normalised to Table 1:
- *   eps_max = 1.3 - 0.18 muM - 0.16 R2 + 0.12 F - 0.09 R1 + 0.02 eM + 0.02 eF - 0.02 muF
- *             - 0.05 muM^2 + 0.1 R2^2 - 0.04 F^2 + 0.02 R1^2 - 0.115 muM eM + 0.108 muM F
- *
- * Rehearsed troubles: muM = 1 under F = 428 on R1 = 5 diverges; R1 = 8.125 kills the process; the
- * environment's ISCHIA_DOUBLE_DELAY_MS makes every solve take that long.
+ *   F 401 N  does not converge        F 402 N  out of memory      F 403 N  the process is killed
+ *   F 404 N  cancelled                F 405 N  takes half a second
  */
+#include "solver/solver.h"
+
+#include <assert.h>
 #include <math.h>
-#include <stdio.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-
-#include "solver/solver.h"
+#include <unistd.h>
 
 struct ischia_solver {
-    long delay_ms;
+    int solves;
 };
-
-struct term {
-    double coefficient;
-    int i, j; /* -1: none */
-};
-static const struct term terms[] = {
-    {1.3, -1, -1},
-    {-0.18, ISCHIA_MUM, -1},
-    {-0.16, ISCHIA_R2, -1},
-    {0.12, ISCHIA_F, -1},
-    {-0.09, ISCHIA_R1, -1},
-    {0.02, ISCHIA_EM, -1},
-    {0.02, ISCHIA_EF, -1},
-    {-0.02, ISCHIA_MUF, -1},
-    {-0.05, ISCHIA_MUM, ISCHIA_MUM},
-    {0.1, ISCHIA_R2, ISCHIA_R2},
-    {-0.04, ISCHIA_F, ISCHIA_F},
-    {0.02, ISCHIA_R1, ISCHIA_R1},
-    {-0.115, ISCHIA_MUM, ISCHIA_EM},
-    {0.108, ISCHIA_MUM, ISCHIA_F},
-};
-
-static double normalised(const struct ischia_case *c, int p)
-{
-    static const double middle[] = {7, 39, 29, 22, 4.5, 5.4, 310};
-    static const double half[] = {2, 24, 10, 13, 3.5, 2.6, 118};
-    return (c->param[p] - middle[p]) / half[p];
-}
-
-static double eps_max_of(const struct ischia_case *c)
-{
-    double sum = 0;
-    for (size_t t = 0; t < sizeof terms / sizeof terms[0]; t++) {
-        const double xi = terms[t].i < 0 ? 1 : normalised(c, terms[t].i);
-        const double xj = terms[t].j < 0 ? 1 : normalised(c, terms[t].j);
-        sum += terms[t].coefficient * xi * xj;
-    }
-    return sum;
-}
 
 enum ischia_code ischia_solver_create(struct ischia_solver **ret_solver, struct ischia_error *err)
 {
-    const char *delay = getenv("ISCHIA_DOUBLE_DELAY_MS");
-    struct ischia_solver *solver = calloc(1, sizeof *solver);
-    CHECK(solver != NULL, err, ISCHIA_E_MEMORY, "no memory");
-    solver->delay_ms = delay != NULL ? strtol(delay, NULL, 10) : 0;
-    *ret_solver = solver;
+    *ret_solver = calloc(1, sizeof **ret_solver);
+    CHECK(*ret_solver != NULL, err, ISCHIA_E_MEMORY, "out of memory");
     return ISCHIA_OK;
 }
 
 void ischia_solver_destroy(struct ischia_solver *solver) { free(solver); }
 
-static void fill_converged(struct ischia_result *r, const struct ischia_case *c)
+static void fill_cluster(struct ischia_cluster_set *set, double volume_mm3)
 {
-    r->strain.eps_max = eps_max_of(c);
-    r->strain.E_shear_max = r->strain.eps_max * 1.5;
-    r->strain.E_comp_max = 0.45;
-    r->seat.displacement_mm = 30;
-    r->seat.contact_area_mm2 = 4000;
-    r->seat.mean_pressure_kPa = c->param[ISCHIA_F] / 4000 * 1e3;
-    r->seat.peak_pressure_kPa = 3 * r->seat.mean_pressure_kPa;
+    set->volume_mm3 = volume_mm3;
+    set->count = volume_mm3 > 0;
+    set->has_largest = volume_mm3 > 0;
+    set->largest = (struct ischia_cluster){.volume_mm3 = volume_mm3,
+                                           .eps_max = 1.0 / 3,
+                                           .E_shear_max = 0.8,
+                                           .E_comp_max = 0.46,
+                                           .centroid_mm = {0, 0, 0.1 * volume_mm3}};
+}
+
+static void fill(const struct ischia_case *c, struct ischia_result *r)
+{
+    double sum = 0;
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) sum += c->param[i] / (i + 7);
+    *r = (struct ischia_result){
+        .strain = {sum / 90, sum / 30, sum / 70, 0.49 - 1 / (sum + 10)},
+        .muscle_volume_mm3 = 1e5 + sum / 3,
+        .seat = {sum / 7, sum * 11, sum / 3, sum / 2},
+        .load_curve = {{c->param[ISCHIA_F] / 2, sum / 14, sum / 180, sum / 140, 0.2},
+                       {c->param[ISCHIA_F], sum / 7, sum / 90, sum / 70, 0.4}},
+        .load_curve_count = 2,
+        .threshold_force_shear_N = c->param[ISCHIA_F] / 3,
+        .threshold_force_compression_N = (double)NAN,
+        .numerics = {.reason = ISCHIA_CONVERGED,
+                     .elements = 10,
+                     .dof = 99,
+                     .load_steps = 3,
+                     .newton_iterations = 12,
+                     .factorisations = 13,
+                     .force_residual = 1e-9 / 3,
+                     .energy_residual = 1e-4 / 3,
+                     .det_F_min = 0.9,
+                     .eps_max_error = sum / 9000,
+                     .last_converged_F_N = c->param[ISCHIA_F]},
+    };
+    fill_cluster(&r->clusters[ISCHIA_OVER_SHEAR], sum * 10);
+    fill_cluster(&r->clusters[ISCHIA_OVER_COMPRESSION], sum / 3);
+    fill_cluster(&r->clusters[ISCHIA_OVER_BOTH], 0);
+}
+
+static void diverge(const struct ischia_case *c, struct ischia_result *r)
+{
+    r->numerics.reason = ISCHIA_DIVERGED_STEP;
+    r->numerics.last_converged_F_N = 0.625 * c->param[ISCHIA_F];
     r->load_curve_count = 1;
-    r->numerics.reason = ISCHIA_CONVERGED;
-    r->numerics.last_converged_F_N = c->param[ISCHIA_F];
+    (void)snprintf(r->numerics.detail, sizeof r->numerics.detail, "the double was told to");
+}
+
+static bool observe(const struct ischia_observer *observer, const struct ischia_case *c)
+{
+    const struct ischia_progress progress = {0.5, 2, 3, c->param[ISCHIA_F] / 2, "halfway"};
+    return observer == NULL || observer->on_progress(observer->context, &progress);
 }
 
 enum ischia_code ischia_solve(struct ischia_solver *solver, const struct ischia_case *c,
@@ -93,23 +90,16 @@ enum ischia_code ischia_solve(struct ischia_solver *solver, const struct ischia_
                               struct ischia_result *ret_result, struct ischia_field *ret_field,
                               struct ischia_error *err)
 {
-    struct ischia_result r = {.threshold_force_shear_N = (double)NAN,
-                              .threshold_force_compression_N = (double)NAN};
-    const struct timespec delay = {solver->delay_ms / 1000, solver->delay_ms % 1000 * 1000000};
-    (void)observer;
-    (void)err;
-    (void)nanosleep(&delay, NULL);
-    if (c->param[ISCHIA_R1] == 8.125) abort();
-    if (c->param[ISCHIA_MUM] == 1 && c->param[ISCHIA_F] == 428 && c->param[ISCHIA_R1] == 5) {
-        r.numerics.reason = ISCHIA_DIVERGED_STEP;
-        r.numerics.last_converged_F_N = 300;
-        (void)snprintf(r.numerics.detail, sizeof r.numerics.detail,
-                       "double: the step fell to 1e-6, \"too small\"");
-    } else {
-        fill_converged(&r, c);
-    }
-    r.numerics.newton_iterations = 7;
-    *ret_result = r;
+    const struct timespec half = {.tv_nsec = 500 * 1000 * 1000};
+    const int how = (int)c->param[ISCHIA_F];
+    assert(ischia_case_is_valid(c));
+    solver->solves++;
+    if (how == 403) (void)kill(getpid(), SIGKILL);
+    if (how == 405) (void)nanosleep(&half, NULL);
+    CHECK(how != 402, err, ISCHIA_E_MEMORY, "out of memory in the double");
+    CHECK(how != 404 && observe(observer, c), err, ISCHIA_E_CANCELLED, "the solve was cancelled");
+    fill(c, ret_result);
+    if (how == 401) diverge(c, ret_result);
     if (ret_field != NULL) *ret_field = (struct ischia_field){0};
     return ISCHIA_OK;
 }
@@ -117,4 +107,36 @@ enum ischia_code ischia_solve(struct ischia_solver *solver, const struct ischia_
 void ischia_field_finish(struct ischia_field *field)
 {
     if (field != NULL) free(field->displacement_mm);
+}
+
+static enum ischia_code write_words(FILE *out, const char *words, struct ischia_error *err)
+{
+    CHECK(fputs(words, out) >= 0, err, ISCHIA_E_IO, "cannot write");
+    return ISCHIA_OK;
+}
+
+enum ischia_code ischia_write_vtu(FILE *out, const struct ischia_case *c,
+                                  const struct ischia_field *field, struct ischia_error *err)
+{
+    (void)c, (void)field;
+    return write_words(out, "<VTKFile/>\n", err);
+}
+
+enum ischia_code ischia_write_section_svg(FILE *out, const struct ischia_case *c,
+                                          const struct ischia_field *field,
+                                          struct ischia_error *err)
+{
+    (void)c, (void)field;
+    return write_words(out, "<svg/>\n", err);
+}
+
+enum ischia_code ischia_write_inp(FILE *out, const struct ischia_case *c, struct ischia_error *err)
+{
+    CHECK((int)c->param[ISCHIA_F] != 401, err, ISCHIA_E_IO, "cannot write: the double was told to");
+    return write_words(out, "*HEADING\n", err);
+}
+
+enum ischia_code ischia_check_tangents(FILE *out, struct ischia_error *err)
+{
+    return write_words(out, "nothing to compare in the double\n", err);
 }
