@@ -24,6 +24,11 @@ def ticks(low, high, target=5):
     return [round(k * step, 10) for k in range(first, int(math.floor(high / step + 1e-9)) + 1)]
 
 
+def symbol(term):
+    """"eM*muM" and "R2^2" as people write them."""
+    return term.replace("mu", "μ").replace("*", "·").replace("^2", "²")
+
+
 def number(value):
     return f"{value:.10g}"
 
@@ -56,7 +61,7 @@ class Figure:
                  f'fill="{colour}" fill-opacity="{opacity}"/>')
 
     def circle(self, x, y, radius, colour, hollow=False):
-        fill = f'fill="#fff" stroke="{colour}" stroke-width="1.6"' if hollow else f'fill="{colour}"'
+        fill = f'fill="#fff" stroke="{colour}" stroke-width="1.6"' if hollow else f'fill="{colour}" stroke="#fff"'
         self.add(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" {fill}/>')
 
     def cloud(self, points, colour, size=2.4, opacity=0.45):
@@ -231,7 +236,7 @@ def coefficient_bars(terms, series, title):
             x = panel.x(i + 0.1 + share * k)
             top = min(panel.y(0), panel.y(thetas[term]))
             figure.rect(x, top, panel.x(share * 0.9) - panel.x(0), abs(panel.y(thetas[term]) - panel.y(0)), colour)
-        figure.text(panel.x(i + 0.5), 342, term, 11, "middle")
+        figure.text(panel.x(i + 0.5), 342, symbol(term), 11, "middle")
     figure.line(64, panel.y(0), 914, panel.y(0))
     figure.text(64, 22, title, 14, weight="bold")
     figure.legend(64, 44, [(colour, words, "bar") for words, colour, _ in series])
