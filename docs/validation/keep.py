@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps a result file for docs/VALIDATION.md: compressed in docs/validation/data, with where it came
-from in manifest.json beside it. Python's standard library only.
+"""Keeps a result file for docs/VALIDATION.md: compressed in docs/validation/data, with where it
+came from in manifest.json beside it. Python's standard library only.
 
   keep.py NAME RESULT.csv --program ischia --command "ischia study factorial ..." [--title WORDS]
 """
@@ -38,7 +38,9 @@ def keep(name, result, program, command, title, data=DATA):
     data.mkdir(parents=True, exist_ok=True)
     # mtime 0: the same results give the same bytes in the repository
     with open(data / f"{name}.csv.gz", "wb") as out:
-        with gzip.GzipFile(filename="", fileobj=out, mode="wb", compresslevel=9, mtime=0) as packed:
+        with gzip.GzipFile(
+            filename="", fileobj=out, mode="wb", compresslevel=9, mtime=0
+        ) as packed:
             packed.write(text)
     version = subprocess.run([program, "--version"], capture_output=True, text=True, check=False)
     manifest_path = data / "manifest.json"

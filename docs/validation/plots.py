@@ -25,7 +25,7 @@ def ticks(low, high, target=5):
 
 
 def symbol(term):
-    """"eM*muM" and "R2^2" as people write them."""
+    """ "eM*muM" and "R2^2" as people write them."""
     return term.replace("mu", "μ").replace("*", "·").replace("^2", "²")
 
 
@@ -37,8 +37,10 @@ class Figure:
     def __init__(self, width, height, title):
         self.width, self.height = width, height
         self.parts = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
-            f'viewBox="0 0 {width} {height}" role="img" {FONT} font-size="12" fill="{INK}">',
+            (
+                f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+                f'viewBox="0 0 {width} {height}" role="img" {FONT} font-size="12" fill="{INK}">'
+            ),
             f"<title>{escape(title)}</title>",
             f'<rect width="{width}" height="{height}" fill="#fff"/>',
         ]
@@ -48,32 +50,47 @@ class Figure:
 
     def text(self, x, y, words, size=12, anchor="start", colour=INK, weight="normal", turn=0):
         turned = f' transform="rotate({turn} {x:.1f} {y:.1f})"' if turn else ""
-        self.add(f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}" '
-                 f'fill="{colour}" font-weight="{weight}"{turned}>{escape(words)}</text>')
+        self.add(
+            f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}" '
+            f'fill="{colour}" font-weight="{weight}"{turned}>{escape(words)}</text>'
+        )
 
     def line(self, x1, y1, x2, y2, colour=INK, width=1.0, dash=None):
         dashed = f' stroke-dasharray="{dash}"' if dash else ""
-        self.add(f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" '
-                 f'stroke-width="{width}"{dashed}/>')
+        self.add(
+            f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" '
+            f'stroke-width="{width}"{dashed}/>'
+        )
 
     def rect(self, x, y, width, height, colour, opacity=1.0):
-        self.add(f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0):.1f}" height="{max(height, 0):.1f}" '
-                 f'fill="{colour}" fill-opacity="{opacity}"/>')
+        self.add(
+            f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0):.1f}"'
+            f' height="{max(height, 0):.1f}" fill="{colour}" fill-opacity="{opacity}"/>'
+        )
 
     def circle(self, x, y, radius, colour, hollow=False):
-        fill = f'fill="#fff" stroke="{colour}" stroke-width="1.6"' if hollow else f'fill="{colour}" stroke="#fff"'
+        fill = (
+            f'fill="#fff" stroke="{colour}" stroke-width="1.6"'
+            if hollow
+            else f'fill="{colour}" stroke="#fff"'
+        )
         self.add(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" {fill}/>')
 
     def cloud(self, points, colour, size=2.4, opacity=0.45):
         """Many points as one path: a tenth of the bytes."""
         path = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
-        self.add(f'<path d="{path}" stroke="{colour}" stroke-width="{size}" stroke-linecap="round" '
-                 f'stroke-opacity="{opacity}" fill="none"/>')
+        self.add(
+            f'<path d="{path}" stroke="{colour}" stroke-width="{size}" stroke-linecap="round" '
+            f'stroke-opacity="{opacity}" fill="none"/>'
+        )
 
     def curve(self, points, colour, width=2.0, dash=None):
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         dashed = f' stroke-dasharray="{dash}"' if dash else ""
-        self.add(f'<polyline points="{path}" stroke="{colour}" stroke-width="{width}" fill="none"{dashed}/>')
+        self.add(
+            f'<polyline points="{path}" stroke="{colour}" stroke-width="{width}"'
+            f' fill="none"{dashed}/>'
+        )
 
     def legend(self, x, y, entries):
         """entries: (colour, words, kind); kind is "bar", "dot" or "ring"."""
@@ -108,31 +125,57 @@ class Panel:
     def y_axis(self, label, target=5, grid=True):
         for tick in ticks(*self.y_range, target):
             if grid:
-                self.figure.line(self.left, self.y(tick), self.left + self.width, self.y(tick), FAINT)
+                self.figure.line(
+                    self.left, self.y(tick), self.left + self.width, self.y(tick), FAINT
+                )
             self.figure.text(self.left - 7, self.y(tick) + 4, number(tick), 11, "end")
         if label:
-            self.figure.text(self.left - 44, self.top + self.height / 2, label, 12, "middle", turn=-90)
+            self.figure.text(
+                self.left - 44, self.top + self.height / 2, label, 12, "middle", turn=-90
+            )
 
     def x_axis(self, label, values=None, target=5, grid=False):
         for tick in values if values is not None else ticks(*self.x_range, target):
             if grid:
-                self.figure.line(self.x(tick), self.top, self.x(tick), self.top + self.height, FAINT)
-            self.figure.line(self.x(tick), self.top + self.height, self.x(tick),
-                             self.top + self.height + 4)
-            self.figure.text(self.x(tick), self.top + self.height + 17, number(tick), 11, "middle")
+                self.figure.line(
+                    self.x(tick), self.top, self.x(tick), self.top + self.height, FAINT
+                )
+            self.figure.line(
+                self.x(tick), self.top + self.height, self.x(tick), self.top + self.height + 4
+            )
+            self.figure.text(
+                self.x(tick), self.top + self.height + 17, number(tick), 11, "middle"
+            )
         if label:
-            self.figure.text(self.left + self.width / 2, self.top + self.height + 36, label, 12, "middle")
+            self.figure.text(
+                self.left + self.width / 2, self.top + self.height + 36, label, 12, "middle"
+            )
         self.frame()
 
     def right_axis(self, label, y_range, colour):
         for tick in ticks(*y_range):
-            position = self.top + self.height - (tick - y_range[0]) / (y_range[1] - y_range[0]) * self.height
-            self.figure.text(self.left + self.width + 7, position + 4, number(tick), 11, colour=colour)
-        self.figure.text(self.left + self.width + 46, self.top + self.height / 2, label, 12, "middle",
-                         colour=colour, turn=90)
+            position = (
+                self.top
+                + self.height
+                - (tick - y_range[0]) / (y_range[1] - y_range[0]) * self.height
+            )
+            self.figure.text(
+                self.left + self.width + 7, position + 4, number(tick), 11, colour=colour
+            )
+        self.figure.text(
+            self.left + self.width + 46,
+            self.top + self.height / 2,
+            label,
+            12,
+            "middle",
+            colour=colour,
+            turn=90,
+        )
 
     def frame(self):
-        self.figure.line(self.left, self.top + self.height, self.left + self.width, self.top + self.height)
+        self.figure.line(
+            self.left, self.top + self.height, self.left + self.width, self.top + self.height
+        )
 
 
 def spread(values, zero=False, margin=0.06):
@@ -148,7 +191,9 @@ def cohort_bars(rows, title):
     it on an axis of its own. rows: (subject, {side: (eps_max, error, pressure) or None})."""
     figure = Figure(940, 400, title)
     solved = [v for _, sides in rows for v in sides.values() if v]
-    panel = Panel(figure, 64, 52, 800, 290, (0, len(rows)), (0, 1.15 * max(v[0] + v[1] for v in solved)))
+    panel = Panel(
+        figure, 64, 52, 800, 290, (0, len(rows)), (0, 1.15 * max(v[0] + v[1] for v in solved))
+    )
     pressure = (0, 1.15 * max(v[2] for v in solved))
     panel.y_axis("ε_max (engineering shear strain)")
     panel.right_axis("mean contact pressure, kPa", pressure, BLUE)
@@ -158,18 +203,32 @@ def cohort_bars(rows, title):
             width = panel.x(0.32) - panel.x(0)
             value = sides.get(side)
             if not value:
-                figure.text(x + width / 2, panel.y(0) - 5, "no result", 10, "start", RED, turn=-90)
+                figure.text(
+                    x + width / 2, panel.y(0) - 5, "no result", 10, "start", RED, turn=-90
+                )
                 continue
             eps, error, kPa = value
-            figure.rect(x, panel.y(eps), width, panel.y(0) - panel.y(eps), GREEN if k == 0 else "#7fcfb4")
-            figure.line(x + width / 2, panel.y(eps - error), x + width / 2, panel.y(eps + error), INK, 1.4)
+            figure.rect(
+                x, panel.y(eps), width, panel.y(0) - panel.y(eps), GREEN if k == 0 else "#7fcfb4"
+            )
+            figure.line(
+                x + width / 2, panel.y(eps - error), x + width / 2, panel.y(eps + error), INK, 1.4
+            )
             height = panel.top + panel.height * (1 - kPa / pressure[1])
             figure.circle(x + width / 2, height, 4, BLUE, hollow=k == 1)
         figure.text(panel.x(i + 0.5), 360, subject, 11, "middle")
     panel.frame()
     figure.text(64, 22, title, 14, weight="bold")
-    figure.legend(64, 43, [(GREEN, "ε_max right", "bar"), ("#7fcfb4", "ε_max left", "bar"),
-                           (BLUE, "pressure right", "dot"), (BLUE, "pressure left", "ring")])
+    figure.legend(
+        64,
+        43,
+        [
+            (GREEN, "ε_max right", "bar"),
+            ("#7fcfb4", "ε_max left", "bar"),
+            (BLUE, "pressure right", "dot"),
+            (BLUE, "pressure left", "ring"),
+        ],
+    )
     figure.text(464, 386, "subject (thin line: estimated discretisation error)", 12, "middle")
     return figure.svg()
 
@@ -180,11 +239,21 @@ def main_effects(effects, curves, title, label="mean ε_max"):
     columns = 4
     lines = math.ceil(len(names) / columns)
     figure = Figure(940, 62 + 210 * lines, title)
-    y_range = spread([m for e in effects.values() for _, m in e] + [m for c in curves.values() for _, m in c])
+    y_range = spread(
+        [m for e in effects.values() for _, m in e] + [m for c in curves.values() for _, m in c]
+    )
     for i, name in enumerate(names):
         levels = effects[name]
         x_range = spread([v for v, _ in levels], margin=0.12)
-        panel = Panel(figure, 66 + 220 * (i % columns), 50 + 210 * (i // columns), 184, 140, x_range, y_range)
+        panel = Panel(
+            figure,
+            66 + 220 * (i % columns),
+            50 + 210 * (i // columns),
+            184,
+            140,
+            x_range,
+            y_range,
+        )
         panel.y_axis(label if i % columns == 0 else "", 4)
         panel.x_axis("", [v for v, _ in levels])
         figure.text(panel.left + 92, panel.top + 172, name, 12, "middle", weight="bold")
@@ -212,11 +281,22 @@ def against(panels, title, x_label, y_label, diagonal=False):
         panel.y_axis(y_label if i == 0 else "")
         panel.x_axis(x_label[i] if isinstance(x_label, (list, tuple)) else x_label)
         if diagonal:
-            figure.line(panel.x(x_range[0]), panel.y(x_range[0]), panel.x(x_range[1]), panel.y(x_range[1]), GREY,
-                        1.2, "5 4")
+            figure.line(
+                panel.x(x_range[0]),
+                panel.y(x_range[0]),
+                panel.x(x_range[1]),
+                panel.y(x_range[1]),
+                GREY,
+                1.2,
+                "5 4",
+            )
         many = len(points) > 400
-        figure.cloud([(panel.x(x), panel.y(y)) for x, y in points], colour, 2.4 if many else 7,
-                     0.45 if many else 0.8)
+        figure.cloud(
+            [(panel.x(x), panel.y(y)) for x, y in points],
+            colour,
+            2.4 if many else 7,
+            0.45 if many else 0.8,
+        )
         figure.text(70 + 400 * i, 50, words, 12)
     figure.text(70, 24, title, 14, weight="bold")
     return figure.svg()
@@ -235,7 +315,13 @@ def coefficient_bars(terms, series, title):
                 continue
             x = panel.x(i + 0.1 + share * k)
             top = min(panel.y(0), panel.y(thetas[term]))
-            figure.rect(x, top, panel.x(share * 0.9) - panel.x(0), abs(panel.y(thetas[term]) - panel.y(0)), colour)
+            figure.rect(
+                x,
+                top,
+                panel.x(share * 0.9) - panel.x(0),
+                abs(panel.y(thetas[term]) - panel.y(0)),
+                colour,
+            )
         figure.text(panel.x(i + 0.5), 342, symbol(term), 11, "middle")
     figure.line(64, panel.y(0), 914, panel.y(0))
     figure.text(64, 22, title, 14, weight="bold")
@@ -257,5 +343,7 @@ def reading_dots(rows, title):
         figure.circle(panel.x(second), y, 5, RED, hollow=True)
         figure.text(734, y + 4, note, 11, colour=GREY)
     figure.text(24, 22, title, 14, weight="bold")
-    figure.legend(250, 46, [(BLUE, "Table 3 (degree 1)", "dot"), (RED, "Table 4 (degree 2)", "ring")])
+    figure.legend(
+        250, 46, [(BLUE, "Table 3 (degree 1)", "dot"), (RED, "Table 4 (degree 2)", "ring")]
+    )
     return figure.svg()

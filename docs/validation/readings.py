@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solves one design under each reading of what the paper leaves open, fits both polynomials and ranks
-the readings by their distance to the printed Tables 3 and 4. Resumable: run it again after a stop.
+"""Solves one design under each reading of what the paper leaves open, fits both polynomials and
+ranks the readings by their distance to the printed Tables 3 and 4. Resumable: run it again after a
+stop.
 
   readings.py --program build/ischia --work DIR [--design DESIGN.json] [--resolution R] [-j N]
               [--only NAME,...] [--keep]
 
-Distance: sqrt(sum (ours - printed)^2 / sum printed^2) over the coefficients that the table prints, so
+Distance: sqrt(sum (ours - printed)^2 / sum printed^2) over the coefficients that the table prints:
 0 is equal and 1 is as far as no effect at all. Signs: how many printed coefficients have our sign.
 --keep puts each result file into docs/validation/data for docs/VALIDATION.md.
 """
@@ -33,7 +34,11 @@ READINGS = [
     ("bulk_50", "bulk ratio 50", {"model": {"bulk_ratio": 50}}),
     ("bulk_200", "bulk ratio 200", {"model": {"bulk_ratio": 200}}),
     ("R2_surface", "R2 at the surface", {"model": {"R2_surface": 1}}),
-    ("R2_surface_bulk_30", "R2 at the surface, bulk ratio 30", {"model": {"R2_surface": 1, "bulk_ratio": 30}}),
+    (
+        "R2_surface_bulk_30",
+        "R2 at the surface, bulk ratio 30",
+        {"model": {"R2_surface": 1, "bulk_ratio": 30}},
+    ),
     ("skin_20", "skin 20 kPa", {"skin": {"mu": 20}}),
     ("skin_200", "skin 200 kPa", {"skin": {"mu": 200}}),
     ("embed_1_5", "bone embedded 1.5 R1", {"model": {"embed_over_R1": 1.5}}),
@@ -59,8 +64,18 @@ def solve(a, name, options):
 
 
 def fits(a, design, out):
-    command = [a.program, "study", "emulate", str(out), "--design", str(design), "--published",
-               str(PUBLISHED), "-o", "-"]
+    command = [
+        a.program,
+        "study",
+        "emulate",
+        str(out),
+        "--design",
+        str(design),
+        "--published",
+        str(PUBLISHED),
+        "-o",
+        "-",
+    ]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
@@ -69,16 +84,27 @@ def summary(document):
     for fit in document["fits"]:
         beside = fit["against_published"]
         order = sorted(fit["parameters"], key=lambda p: -p["S_percent"])
-        row[fit["degree"]] = {**beside, "r2": fit["r2"], "ms": fit["mean_squared_residuals"],
-                              "order": [p["key"] for p in order]}
+        row[fit["degree"]] = {
+            **beside,
+            "r2": fit["r2"],
+            "ms": fit["mean_squared_residuals"],
+            "order": [p["key"] for p in order],
+        }
     return row
+
+
+def fit_words(fit):
+    signs = f"{fit['same_sign']}/{fit['terms']}"
+    return f"{fit['relative_distance']:7.2f} {signs:>6} {fit['r2']:6.3f} {fit['ms']:9.2g}  "
 
 
 def main():
     parse = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parse.add_argument("--program", required=True)
     parse.add_argument("--work", type=pathlib.Path, required=True)
-    parse.add_argument("--design", type=pathlib.Path, default=ROOT / "examples/design_table1_ninth.json")
+    parse.add_argument(
+        "--design", type=pathlib.Path, default=ROOT / "examples/design_table1_ninth.json"
+    )
     parse.add_argument("--resolution", default="coarse")
     parse.add_argument("-j", "--jobs", type=int)
     parse.add_argument("--only", default="")
@@ -94,15 +120,19 @@ def main():
             said = f"readings.py --design {a.design.name} --resolution {a.resolution}"
             keep.keep(f"reading_{name}", out, a.program, said, words, a.data)
         rows.append((words, summary(fits(a, a.design, out))))
-    rows.sort(key=lambda r: r[1][1]["relative_distance"] + r[1].get(2, r[1][1])["relative_distance"])
-    print(f"{'reading':38} {'rows':>9} {'dist 3':>7} {'signs':>6} {'R2':>6} {'dist 4':>7} {'signs':>6} "
-          f"{'R2':>6} {'ms':>8}  order (degree 2)")
-    for words, r in rows:
-        one, two = r[1], r.get(2, r[1])
-        print(f"{words:38} {r['used']:4}/{r['rows']:4} {one['relative_distance']:7.2f} "
-              f"{one['same_sign']:3}/{one['terms']:<2} {one['r2']:6.3f} {two['relative_distance']:7.2f} "
-              f"{two['same_sign']:3}/{two['terms']:<2} {two['r2']:6.3f} {two['ms']:8.2g}  "
-              f"{' '.join(two['order'][:4])}")
+    rows.sort(
+        key=lambda r: r[1][1]["relative_distance"] + r[1].get(2, r[1][1])["relative_distance"]
+    )
+    columns = ["dist", "signs", "R2", "mean sq"]
+    print(f"{'':38} {'converged':>9} {'Table 3, degree 1':^31} {'Table 4, degree 2':^31}")
+    print(f"{'reading':38} {'':9} " + 2 * "{:>7} {:>6} {:>6} {:>9} ".format(*columns) + " order")
+    for words, row in rows:
+        fitted = [row[d] for d in (1, 2) if d in row]
+        print(
+            f"{words:38} {row['used']:4}/{row['rows']:<4} "
+            + "".join(fit_words(f) for f in fitted)
+            + " > ".join(fitted[-1]["order"][:4])
+        )
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ int study_merge(int argc, char **argv);
 int study_emulate(int argc, char **argv);
 int study_compare(int argc, char **argv);
 
-/* Prints "ischia study WHAT: message" on stderr and returns the exit status for the error's code. */
+/* Prints "ischia study WHAT: message" on stderr and returns the exit status that fits the code. */
 int study_failed(const char *what, const struct ischia_error *err);
 
 /* Prints a hint at the usage on stderr and returns EXIT_BAD_INPUT. */

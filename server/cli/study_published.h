@@ -32,6 +32,7 @@ struct study_published {
     struct study_published_degree degree[2]; /* degree 1, degree 2 */
 };
 
+/* ISCHIA_E_INPUT: not JSON, or not of that form; else as file_read. *ret is untouched on error. */
 ISCHIA_MUST_CHECK enum ischia_code study_published_read(struct study_published *ret,
                                                         const char *path, struct ischia_error *err);
 

@@ -19,7 +19,9 @@ ISCHIA_MUST_CHECK enum ischia_code study_table_read(struct study_table *ret, con
                                                     struct ischia_error *err);
 void study_table_finish(struct study_table *table); /* a zeroed one is allowed */
 
-int study_table_column(const struct study_table *table, const char *name); /* -1: none */
+/* The first column of that name, -1 when there is none. */
+int study_table_column(const struct study_table *table, const char *name);
+/* The cell as it stands in the file; row 0 is the first below the header. */
 const char *study_table_text(const struct study_table *table, size_t row, int column);
 /* NaN for a cell that is not one finite number. */
 double study_table_number(const struct study_table *table, size_t row, int column);

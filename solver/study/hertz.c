@@ -62,7 +62,7 @@ static double axis_ratio(double radius_ratio)
 }
 
 /* Principal stresses x, y, z over p0 at depth z (over b) on the axis; Simpson in t, r = sin t, and
- * the midpoint rule over a quarter turn, which is exact to rounding for a smooth periodic function. */
+ * the midpoint rule over a quarter turn: exact to rounding for a smooth periodic function. */
 static void axis_stress(double q, double z, double ret[3])
 {
     enum { RINGS = 128, SPOKES = 48 };

@@ -67,16 +67,32 @@ def pair_statistics(a, b):
     t = stats.t.ppf(0.975, n - 1)
     residual = b - line.intercept - line.slope * a
     return [
-        r.statistic, r.pvalue, ci.low, ci.high, rho.correlation, rho.pvalue,
-        np.mean(d**2), line.slope, line.intercept, np.mean(residual**2), np.var(b),
-        d.mean(), sd, d.mean() - t * sd / np.sqrt(n), d.mean() + t * sd / np.sqrt(n),
-        d.mean() - 1.96 * sd, d.mean() + 1.96 * sd, t * sd * np.sqrt(3 / n),
+        r.statistic,
+        r.pvalue,
+        ci.low,
+        ci.high,
+        rho.correlation,
+        rho.pvalue,
+        np.mean(d**2),
+        line.slope,
+        line.intercept,
+        np.mean(residual**2),
+        np.var(b),
+        d.mean(),
+        sd,
+        d.mean() - t * sd / np.sqrt(n),
+        d.mean() + t * sd / np.sqrt(n),
+        d.mean() - 1.96 * sd,
+        d.mean() + 1.96 * sd,
+        t * sd * np.sqrt(3 / n),
     ]
 
 
-STATISTICS = ("pearson_r pearson_p pearson_low pearson_high spearman_rho spearman_p mean_square slope "
-              "intercept corrected_mean_square constant_mean_square bias bias_sd bias_low bias_high "
-              "limit_low limit_high limits_half_ci").split()
+STATISTICS = (
+    "pearson_r pearson_p pearson_low pearson_high spearman_rho spearman_p mean_square slope "
+    "intercept corrected_mean_square constant_mean_square bias bias_sd bias_low bias_high "
+    "limit_low limit_high limits_half_ci"
+).split()
 
 
 def sequence_rows():
@@ -105,17 +121,25 @@ def main():
     out = pathlib.Path(sys.argv[1])
     write(out / "special.csv", ["function", "a", "b", "x", "value"], special_rows())
     pairs = list(samples())
-    write(out / "pairs.csv", ["sample", "a", "b"],
-          ((name, x, y) for name, a, b in pairs for x, y in zip(a, b)))
+    write(
+        out / "pairs.csv",
+        ["sample", "a", "b"],
+        ((name, x, y) for name, a, b in pairs for x, y in zip(a, b)),
+    )
     # the committed text, not the doubles in memory, is what the test reads: repr() keeps both equal
-    write(out / "pairs_expected.csv", ["sample", *STATISTICS],
-          ((name, *pair_statistics(a, b)) for name, a, b in pairs))
+    write(
+        out / "pairs_expected.csv",
+        ["sample", *STATISTICS],
+        ((name, *pair_statistics(a, b)) for name, a, b in pairs),
+    )
     write(out / "sequence.csv", ["index", "dimension", "sobol", "halton"], sequence_rows())
     A, y, expected = regression()
     write(out / "regression.csv", ["c0", "c1", "c2", "y"], (list(r) + [v] for r, v in zip(A, y)))
-    write(out / "regression_expected.csv",
-          ["b0", "b1", "b2", "se0", "se1", "se2", "mean_square", "r2", "r2_adjusted", "loo"],
-          [expected])
+    write(
+        out / "regression_expected.csv",
+        ["b0", "b1", "b2", "se0", "se1", "se2", "mean_square", "r2", "r2_adjusted", "loo"],
+        [expected],
+    )
     print(f"written with SciPy {scipy.__version__}, NumPy {np.__version__}")
 
 

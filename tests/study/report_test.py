@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/validation: keep.py, readings.py and make.py over the double whose eps_max is a known polynomial.
-Run as report_test.py PROGRAM SOURCE_ROOT [unittest arguments]."""
+"""docs/validation: keep.py, readings.py and make.py over the double whose eps_max is a known
+polynomial. Run as report_test.py PROGRAM SOURCE_ROOT [unittest arguments]."""
 
 import gzip
 import json
@@ -18,9 +18,13 @@ VALIDATION = ROOT / "docs/validation"
 
 
 def run(*command, status=0):
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        [str(c) for c in command], capture_output=True, text=True, timeout=120, check=False
+    )
     if done.returncode != status:
-        raise AssertionError(f"exit {done.returncode}, expected {status}: {command}\n{done.stderr}")
+        raise AssertionError(
+            f"exit {done.returncode}, expected {status}: {command}\n{done.stderr}"
+        )
     return done
 
 
@@ -32,35 +36,91 @@ class Report(unittest.TestCase):
         cls.data = cls.path / "data"
         cohort, table1 = cls.path / "cohort.csv", cls.path / "table1.csv"
         run(PROGRAM, "cohort", ROOT / "examples/cohort_table2.csv", "-o", cohort)
-        run(PROGRAM, "study", "factorial", ROOT / "examples/design_table1.json", "-o", table1, "-q", status=1)
+        run(
+            PROGRAM,
+            "study",
+            "factorial",
+            ROOT / "examples/design_table1.json",
+            "-o",
+            table1,
+            "-q",
+            status=1,
+        )
         for name, file in (("cohort_default", cohort), ("table1_default", table1)):
-            run(sys.executable, VALIDATION / "keep.py", name, file, "--program", PROGRAM, "--command",
-                "ischia …", "--data", cls.data)
-        run(sys.executable, VALIDATION / "readings.py", "--program", PROGRAM, "--work", cls.path / "work",
-            "--design", ROOT / "examples/design_table1_composite.json", "--only", "default,bulk_30", "--keep",
-            "--data", cls.data)
+            run(
+                sys.executable,
+                VALIDATION / "keep.py",
+                name,
+                file,
+                "--program",
+                PROGRAM,
+                "--command",
+                "ischia …",
+                "--data",
+                cls.data,
+            )
+        run(
+            sys.executable,
+            VALIDATION / "readings.py",
+            "--program",
+            PROGRAM,
+            "--work",
+            cls.path / "work",
+            "--design",
+            ROOT / "examples/design_table1_composite.json",
+            "--only",
+            "default,bulk_30",
+            "--keep",
+            "--data",
+            cls.data,
+        )
 
     @classmethod
     def tearDownClass(cls):
         cls.folder.cleanup()
 
     def make(self, out, status=0):
-        return run(sys.executable, VALIDATION / "make.py", "--program", PROGRAM, "--data", self.data, "--out", out,
-                   status=status)
+        return run(
+            sys.executable,
+            VALIDATION / "make.py",
+            "--program",
+            PROGRAM,
+            "--data",
+            self.data,
+            "--out",
+            out,
+            status=status,
+        )
 
     def test_the_page_says_what_the_files_say(self):
         out = self.path / "out"
         self.make(out)
         page = (out / "VALIDATION.md").read_text()
-        for words in ("26 of 26 sides converged", "**2106 of 2187** solves converged", "| μM | −0.1770 | −0.18",
-                      "| R2² | +0.0985 | +0.1000 |", "bulk ratio 30", "## All points of Table 1", "double: the step fell"):
+        for words in (
+            "26 of 26 sides converged",
+            "**2106 of 2187** solves converged",
+            "| μM | −0.1770 | −0.18",
+            "| R2² | +0.0985 | +0.1000 |",
+            "bulk ratio 30",
+            "## All points of Table 1",
+            "double: the step fell",
+        ):
             self.assertIn(words, page)
         # the misprint of Table 3 is arithmetic on the paper alone: 0.177 sqrt(10 / 38) = 0.0908
         self.assertIn("needs a magnitude of 0.091", page)
         figures = sorted(p.name for p in (out / "validation").iterdir())
-        self.assertEqual(figures, ["coefficients_1.svg", "coefficients_2.svg", "cohort_default.svg",
-                                   "emulator_default.svg", "main_effects_default.svg", "pressure_default.svg",
-                                   "readings.svg"])
+        self.assertEqual(
+            figures,
+            [
+                "coefficients_1.svg",
+                "coefficients_2.svg",
+                "cohort_default.svg",
+                "emulator_default.svg",
+                "main_effects_default.svg",
+                "pressure_default.svg",
+                "readings.svg",
+            ],
+        )
         for name in figures:
             self.assertIn(f"validation/{name}", page)
             root = ElementTree.parse(out / "validation" / name).getroot()
@@ -70,14 +130,19 @@ class Report(unittest.TestCase):
         for name in ("one", "two"):
             self.make(self.path / name)
         for path in (self.path / "one").rglob("*.*"):
-            self.assertEqual(path.read_bytes(), (self.path / "two" / path.relative_to(self.path / "one")).read_bytes())
+            self.assertEqual(
+                path.read_bytes(),
+                (self.path / "two" / path.relative_to(self.path / "one")).read_bytes(),
+            )
 
     def test_a_changed_file_stops_the_run(self):
         kept = self.data / "cohort_default.csv.gz"
         good = kept.read_bytes()
         kept.write_bytes(gzip.compress(gzip.decompress(good).replace(b"P-01", b"P-99")))
         try:
-            self.assertIn("does not match its checksum", self.make(self.path / "bad", status=1).stderr)
+            self.assertIn(
+                "does not match its checksum", self.make(self.path / "bad", status=1).stderr
+            )
         finally:
             kept.write_bytes(good)
 
