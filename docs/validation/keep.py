@@ -42,14 +42,16 @@ def keep(name, result, program, command, title, data=DATA):
             filename="", fileobj=out, mode="wb", compresslevel=9, mtime=0
         ) as packed:
             packed.write(text)
-    version = subprocess.run([program, "--version"], capture_output=True, text=True, check=False)
+    said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)
+    lines = said.stdout.splitlines()
     manifest_path = data / "manifest.json"
     manifest = json.loads(manifest_path.read_text()) if manifest_path.exists() else {}
     manifest[name] = {
         "title": title or name,
         "rows": text.count(b"\n") - 1,
         "sha256": hashlib.sha256(text).hexdigest(),
-        "version": " ".join(version.stdout.split()) if version.returncode == 0 else "unknown",
+        "version": ", ".join(lines[:2]),
+        "libraries": ", ".join(lines[2:]),
         "command": command,
         "machine": machine(),
         "date": datetime.date.today().isoformat(),

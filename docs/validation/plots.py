@@ -3,6 +3,7 @@
 tell apart; every figure also reads in grey."""
 
 import math
+import os
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6b7280"
 INK, FAINT = "#1f2937", "#d9dde3"
@@ -190,6 +191,8 @@ def cohort_bars(rows, title):
     """Like Fig. 3 of the paper: eps_max of each subject and side, the mean contact pressure beside
     it on an axis of its own. rows: (subject, {side: (eps_max, error, pressure) or None})."""
     figure = Figure(940, 400, title)
+    prefix = os.path.commonprefix([subject for subject, _ in rows])
+    prefix = prefix[: prefix.rfind("-") + 1]
     solved = [v for _, sides in rows for v in sides.values() if v]
     panel = Panel(
         figure, 64, 52, 800, 290, (0, len(rows)), (0, 1.15 * max(v[0] + v[1] for v in solved))
@@ -216,7 +219,7 @@ def cohort_bars(rows, title):
             )
             height = panel.top + panel.height * (1 - kPa / pressure[1])
             figure.circle(x + width / 2, height, 4, BLUE, hollow=k == 1)
-        figure.text(panel.x(i + 0.5), 360, subject, 11, "middle")
+        figure.text(panel.x(i + 0.5), 360, subject[len(prefix) :], 11, "middle")
     panel.frame()
     figure.text(64, 22, title, 14, weight="bold")
     figure.legend(

@@ -175,12 +175,21 @@ static enum ischia_code column_series(struct comparison *c, int file, const char
     return ISCHIA_OK;
 }
 
+/* Cohort files may name their columns with the unit: R1 or R1_mm. */
+static int input_column(const struct study_table *t, const struct ischia_param_info *info)
+{
+    char with_unit[32];
+    const int column = study_table_column(t, info->key);
+    (void)snprintf(with_unit, sizeof with_unit, "%s_%s", info->key, info->unit);
+    return column >= 0 ? column : study_table_column(t, with_unit);
+}
+
 /* The case that a row states; false when it does not state a valid one. */
 static bool case_of_row(const struct study_table *t, size_t row, struct ischia_case *ret)
 {
     *ret = ischia_case_default();
     for (int p = 0; p < ISCHIA_PARAM_COUNT; p++) {
-        const int column = study_table_column(t, ischia_params[p].key);
+        const int column = input_column(t, &ischia_params[p]);
         if (column < 0) return false;
         ret->param[p] = study_table_number(t, row, column);
     }

@@ -35,7 +35,7 @@ class Report(unittest.TestCase):
         cls.path = pathlib.Path(cls.folder.name)
         cls.data = cls.path / "data"
         cohort, table1 = cls.path / "cohort.csv", cls.path / "table1.csv"
-        run(PROGRAM, "cohort", ROOT / "examples/cohort_table2.csv", "-o", cohort)
+        run(PROGRAM, "cohort", ROOT / "examples/table2.csv", "-o", cohort)
         run(
             PROGRAM,
             "study",
@@ -138,7 +138,9 @@ class Report(unittest.TestCase):
     def test_a_changed_file_stops_the_run(self):
         kept = self.data / "cohort_default.csv.gz"
         good = kept.read_bytes()
-        kept.write_bytes(gzip.compress(gzip.decompress(good).replace(b"P-01", b"P-99")))
+        kept.write_bytes(
+            gzip.compress(gzip.decompress(good).replace(b"table2-1,", b"table2-99,"))
+        )
         try:
             self.assertIn(
                 "does not match its checksum", self.make(self.path / "bad", status=1).stderr

@@ -185,19 +185,22 @@ class Resuming(InTemporaryFolder):
         whole = self.whole()
         pick = random.Random(9)
         out, journal = self.path / "killed.csv", self.path / "killed.csv.journal"
-        kills = 0
         for _ in range(8):
+            before = journal.stat().st_size if journal.exists() else 0
             study = subprocess.Popen(
                 [PROGRAM, "study", "factorial", TABLE1, "-o", out, "-j", "2", "-q"],
-                env={**os.environ, "ISCHIA_DOUBLE_DELAY_MS": "2"},
+                env={**os.environ, "ISCHIA_DOUBLE_DELAY_MS": "5"},
             )
-            time.sleep(pick.uniform(0.01, 0.3))
-            kills += study.poll() is None
-            study.send_signal(signal.SIGKILL)
+            while not journal.exists() or journal.stat().st_size <= before:
+                time.sleep(0.002)
+            time.sleep(pick.uniform(0, 0.2))
+            self.assertIsNone(study.poll())
+            study.kill()
             study.wait()
             self.assertFalse(out.exists())
-        self.assertGreater(kills, 4)
-        self.assertGreater(len(journal.read_bytes().splitlines()), 10)
+        lines = len(journal.read_bytes().splitlines())
+        self.assertGreater(lines, 8)
+        self.assertLess(lines, 2187)
         run("factorial", TABLE1, "-o", out, "-j", 2, "-q", status=1)
         self.assertEqual(out.read_bytes(), whole)
         run("factorial", TABLE1, "-o", out, "-j", 2, "-q", status=1)  # nothing left to do
