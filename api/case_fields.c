@@ -111,7 +111,7 @@ const char *case_doc_nearest_key(const char *key)
     for (int i = 0; i < KEY_COUNT; i++) {
         if (is_beginning(name, case_key_name(i))) return case_key_name(i);
         const int distance = text_distance(name, case_key_name(i));
-        if (distance >= least) continue;
+        if (distance >= least || distance >= (int)strlen(name)) continue;
         least = distance;
         nearest = case_key_name(i);
     }
@@ -136,7 +136,10 @@ bool case_key_first_time(struct case_doc_fields *fields, int key, const char *sp
     const bool first = (fields->seen & bit) == 0;
     fields->seen |= bit;
     if (first) return true;
-    (void)doc_pointer(pointer, sizeof pointer, "", spelling);
+    if (key >= KEY_FIRST_OPTION)
+        (void)key_pointer(key, pointer);
+    else
+        (void)doc_pointer(pointer, sizeof pointer, "", spelling);
     if (!doc_faults_has(fields->faults, pointer))
         doc_faults_add(fields->faults, pointer, "duplicate", "%s is given more than once%s%s",
                        spelling, strcmp(spelling, case_key_name(key)) != 0 ? ", also as " : "",
