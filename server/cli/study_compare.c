@@ -129,7 +129,7 @@ static enum ischia_code join(struct comparison *c, struct ischia_error *err)
     TRY(choose_keys(c, err));
     for (int f = 0; f < 2; f++) {
         c->row_of[f] = calloc(rows + 1, sizeof(size_t));
-        CHECK(c->row_of[f] != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows", rows);
+        CHECK(c->row_of[f] != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows", rows);
     }
     for (size_t a = 0; a < rows; a++) {
         const size_t b = c->arguments->files == 2 ? partner(c, a) : 0;
@@ -153,7 +153,7 @@ static enum ischia_code add_series(struct comparison *c, int file, const char *n
     (void)snprintf(s->name, sizeof s->name, "%s%s",
                    c->arguments->files == 1 ? "" : (file == 0 ? "A " : "B "), name);
     s->value = calloc(c->rows + 1, sizeof *s->value);
-    CHECK(s->value != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows", c->rows);
+    CHECK(s->value != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows", c->rows);
     *ret = c->series_count++;
     return ISCHIA_OK;
 }
@@ -202,7 +202,7 @@ static enum ischia_code hertz_series(struct comparison *c, int *ret, struct isch
 {
     bool any = false;
     c->hertz_valid = calloc(c->rows + 1, sizeof *c->hertz_valid);
-    CHECK(c->hertz_valid != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows", c->rows);
+    CHECK(c->hertz_valid != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows", c->rows);
     TRY(add_series(c, 0, "eps_hertz", ret, err));
     for (size_t i = 0; i < c->rows; i++) {
         struct ischia_case values;
@@ -230,7 +230,7 @@ static enum ischia_code add_pair(struct comparison *c, int a, int b, bool readin
     size_t n = 0;
     if (a < 0 || b < 0) return ISCHIA_OK;
     double *x = calloc(2 * c->rows + 1, sizeof *x), *y = x + c->rows;
-    CHECK(x != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu pairs", c->rows);
+    CHECK(x != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu pairs", c->rows);
     for (size_t i = 0; i < c->rows; i++) {
         if (isnan(c->series[a].value[i]) || isnan(c->series[b].value[i])) continue;
         x[n] = c->series[a].value[i];

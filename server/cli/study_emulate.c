@@ -120,7 +120,7 @@ static enum ischia_code take_rows(struct emulation *e, struct ischia_error *err)
     TRY(find_columns(e, column, &response, err));
     e->x = calloc(e->table.rows * k + 1, sizeof *e->x);
     e->y = calloc(e->table.rows + 1, sizeof *e->y);
-    CHECK(e->x != NULL && e->y != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows",
+    CHECK(e->x != NULL && e->y != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows",
           e->table.rows);
     for (size_t row = 0; row < e->table.rows; row++) {
         const double y = study_table_number(&e->table, row, response);
@@ -468,7 +468,7 @@ int study_emulate(int argc, char **argv)
     }
     struct emulation *e = calloc(1, sizeof *e);
     if (e == NULL) {
-        (void)FAIL(&err, ISCHIA_E_MEMORY, "no memory");
+        (void)FAIL(&err, ISCHIA_E_MEMORY, "out of memory");
         return study_failed("emulate", &err);
     }
     e->arguments = &arguments;

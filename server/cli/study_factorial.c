@@ -306,7 +306,8 @@ static enum ischia_code solve_rows(struct study *s, struct ischia_error *err)
     count_finished(s);
     start_progress(s);
     s->died = calloc(s->plan.points.count + 1, sizeof *s->died);
-    CHECK(s->died != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows", s->plan.points.count);
+    CHECK(s->died != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows",
+          s->plan.points.count);
     if (s->done < s->total) {
         TRY(crew_start(&s->crew, s->arguments->jobs, err));
         const enum ischia_code code = work_through(s, err);

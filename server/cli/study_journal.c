@@ -57,7 +57,7 @@ static enum ischia_code keep(struct study_journal *journal, size_t row, const ch
 {
     if (journal->text[row] != NULL) return ISCHIA_OK;
     journal->text[row] = strdup(text);
-    CHECK(journal->text[row] != NULL, err, ISCHIA_E_MEMORY, "no memory for row %zu", row + 1);
+    CHECK(journal->text[row] != NULL, err, ISCHIA_E_MEMORY, "out of memory for row %zu", row + 1);
     journal->done++;
     return ISCHIA_OK;
 }
@@ -147,7 +147,7 @@ enum ischia_code study_journal_open(struct study_journal *ret, const char *path,
     journal.text = calloc(rows > 0 ? rows : 1, sizeof *journal.text);
     enum ischia_code code = ISCHIA_OK;
     if (journal.text == NULL) {
-        code = FAIL(err, ISCHIA_E_MEMORY, "no memory for %zu rows", rows);
+        code = FAIL(err, ISCHIA_E_MEMORY, "out of memory for %zu rows", rows);
     } else if (flock(journal.fd, LOCK_EX | LOCK_NB) != 0) {
         code =
             FAIL(err, ISCHIA_E_STATE, "another process is running this study (%s is taken)", path);

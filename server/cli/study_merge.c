@@ -41,7 +41,7 @@ static enum ischia_code take_line(struct merge *m, const char *path, const char 
     CHECK(m->line[row] == NULL || strcmp(m->line[row], line) == 0, err, ISCHIA_E_INPUT,
           "%s: row %llu is in another shard with another result", path, number);
     if (m->line[row] == NULL) m->line[row] = strdup(line);
-    CHECK(m->line[row] != NULL, err, ISCHIA_E_MEMORY, "no memory for row %llu", number);
+    CHECK(m->line[row] != NULL, err, ISCHIA_E_MEMORY, "out of memory for row %llu", number);
     return ISCHIA_OK;
 }
 
@@ -96,7 +96,8 @@ static enum ischia_code run_merge(struct merge *m, char **shards, int count, con
     study_plan_put_header(&header, &m->plan);
     TRY(text_out_take(&header, &m->header, NULL, err));
     m->line = calloc(m->plan.points.count + 1, sizeof *m->line);
-    CHECK(m->line != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows", m->plan.points.count);
+    CHECK(m->line != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows",
+          m->plan.points.count);
     for (int i = 0; i < count; i++) TRY(take_shard(m, shards[i], err));
     return write_merged(m, output, err);
 }

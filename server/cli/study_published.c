@@ -70,7 +70,7 @@ enum ischia_code study_published_read(struct study_published *ret, const char *p
     struct json *root;
     char *text = NULL;
     size_t length;
-    CHECK(published != NULL, err, ISCHIA_E_MEMORY, "no memory to read %s", path);
+    CHECK(published != NULL, err, ISCHIA_E_MEMORY, "out of memory while reading %s", path);
     doc_faults_init(&faults);
     enum ischia_code code = file_read(path, published_limits.bytes_max, &text, &length, err);
     if (code == ISCHIA_OK) code = json_parse(&root, text, length, &published_limits, &faults, err);

@@ -27,14 +27,14 @@ static enum ischia_code add_line(struct study_table *t, size_t lines, const stru
           "line %ld has %d fields, the header has %d", row->line, row->count, t->columns);
     const size_t columns = (size_t)t->columns;
     char **larger = reallocarray(t->cell, (lines + 1) * columns, sizeof *larger);
-    CHECK(larger != NULL, err, ISCHIA_E_MEMORY, "no memory for line %ld", row->line);
+    CHECK(larger != NULL, err, ISCHIA_E_MEMORY, "out of memory for line %ld", row->line);
     t->cell = larger;
     memset(&larger[lines * columns], 0, columns * sizeof *larger);
     t->rows = lines;
     for (int c = 0; c < t->columns; c++) {
         larger[lines * columns + (size_t)c] = strdup(c < row->count ? row->field[c] : "");
         CHECK(larger[lines * columns + (size_t)c] != NULL, err, ISCHIA_E_MEMORY,
-              "no memory for line %ld", row->line);
+              "out of memory for line %ld", row->line);
     }
     return ISCHIA_OK;
 }

@@ -255,7 +255,7 @@ enum ischia_code design_points_init(struct design_points *ret, const struct desi
     const size_t rows = sink.count, room = rows > 0 ? rows : 1;
     sink = (struct sink){.design = design,
                          .value = calloc(room * (size_t)design->factor_count, sizeof(double))};
-    CHECK(sink.value != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows", rows);
+    CHECK(sink.value != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows", rows);
     put_rows[design->kind](&sink);
     *ret = (struct design_points){rows, design->factor_count, sink.value};
     return ISCHIA_OK;

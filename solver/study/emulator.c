@@ -71,7 +71,7 @@ enum ischia_code emulator_init(struct emulator *ret, int params, int degree, con
     struct emulator e = {.params = params, .degree = degree};
     e.terms = emulator_terms(params, degree, e.term);
     double *A = calloc(n > 0 ? n * (size_t)e.terms : 1, sizeof *A);
-    CHECK(A != NULL, err, ISCHIA_E_MEMORY, "no memory for %zu rows of %d terms", n, e.terms);
+    CHECK(A != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows of %d terms", n, e.terms);
     for (int t = 0; t < e.terms; t++)
         for (size_t row = 0; row < n; row++)
             A[(size_t)t * n + row] = monomial(e.term[t], &x[row * (size_t)params]);

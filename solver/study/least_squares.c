@@ -44,7 +44,7 @@ static enum ischia_code work_init(struct work *ret, const double *A, const doubl
                      .R_inverse = calloc(k * k, sizeof(double))};
     if (w.QR == NULL || w.tau == NULL || w.y == NULL || w.R_inverse == NULL) {
         work_finish(&w);
-        return FAIL(err, ISCHIA_E_MEMORY, "no memory for a fit of %zu rows, %zu terms", n, k);
+        return FAIL(err, ISCHIA_E_MEMORY, "out of memory for a fit of %zu rows, %zu terms", n, k);
     }
     memcpy(w.QR, A, n * k * sizeof *A);
     memcpy(w.y, y, n * sizeof *y);
@@ -170,7 +170,7 @@ enum ischia_code least_squares_init(struct least_squares *ret, const double *A, 
     fit.residual = calloc(n, sizeof(double));
     const bool allocated = fit.beta != NULL && fit.se != NULL && fit.residual != NULL;
     enum ischia_code code = allocated ? fit_with(&w, A, y, &fit, err)
-                                      : FAIL(err, ISCHIA_E_MEMORY, "no memory for a fit");
+                                      : FAIL(err, ISCHIA_E_MEMORY, "out of memory for a fit");
     work_finish(&w);
     if (code == ISCHIA_OK) {
         *ret = fit;

@@ -113,7 +113,7 @@ static enum ischia_code spearman(const double *a, const double *b, size_t n, dou
     }
     free(rank);
     free(scratch);
-    return allocated ? ISCHIA_OK : FAIL(err, ISCHIA_E_MEMORY, "no memory for %zu ranks", n);
+    return allocated ? ISCHIA_OK : FAIL(err, ISCHIA_E_MEMORY, "out of memory for %zu ranks", n);
 }
 
 static void regression(const double *a, const double *b, const struct moments *m,

@@ -65,7 +65,7 @@ enum ischia_code ischia_solver_create(struct ischia_solver **ret_solver, struct 
 {
     const char *delay = getenv("ISCHIA_DOUBLE_DELAY_MS");
     struct ischia_solver *solver = calloc(1, sizeof *solver);
-    CHECK(solver != NULL, err, ISCHIA_E_MEMORY, "no memory");
+    CHECK(solver != NULL, err, ISCHIA_E_MEMORY, "out of memory");
     solver->delay_ms = delay != NULL ? strtol(delay, NULL, 10) : 0;
     *ret_solver = solver;
     return ISCHIA_OK;
