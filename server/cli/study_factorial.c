@@ -187,7 +187,7 @@ static void show_progress(struct study *s)
 {
     char words[160];
     const double now = now_s(), pause = s->bar.shown ? 0.2 : 10;
-    if (s->arguments->quiet || s->done == s->before || now - s->shown_s < pause) return;
+    if (s->arguments->quiet || s->done == s->total || now - s->shown_s < pause) return;
     s->shown_s = now;
     state_words(s, words, sizeof words);
     if (s->bar.shown) {

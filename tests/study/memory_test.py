@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`ischia study` with its 1st, 2nd, 3rd ... allocation failing: it says so and ends, or does without;
-what it leaves behind is whole. Run as memory_test.py STARVED_PROGRAM SOURCE_ROOT."""
+"""`ischia study` with its 1st, 2nd, 3rd ... allocation failing: it says so and ends, or does
+without; what it leaves behind is whole. Run as memory_test.py STARVED_PROGRAM SOURCE_ROOT."""
 
 import os
 import pathlib
