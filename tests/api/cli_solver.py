@@ -20,14 +20,14 @@ def without_clock(rows):
 class Solver(cli.Case):
     def test_a_side(self):
         done = run("solve", "--vtu", self.path("a.vtu"), "--svg", self.path("a.svg"), stdin=COARSE,
-                   timeout=250)
+                   timeout=1200)
         self.assertEnds(done, 0, 0)
         result = json.loads(done.stdout)
         numerics, strain = result["numerics"], result["strain"]
         self.assertTrue(numerics["converged"])
         self.assertLessEqual(numerics["force_residual"], 1e-8)
         self.assertGreater(numerics["det_F_min"], 0)
-        self.assertLessEqual(numerics["energy_residual"], 0.005)
+        self.assertLessEqual(abs(numerics["energy_residual"]), 0.005)
         self.assertGreater(numerics["wall_s"], 0)
         self.assertGreater(numerics["cpu_s"], 0)
         self.assertTrue(0.5 < strain["eps_max"] < 3)
@@ -40,13 +40,13 @@ class Solver(cli.Case):
         text = HEADER + "\n" + "\n".join(ROWS + ROWS[:1])
         tables = []
         for jobs in ("1", "2"):
-            done = run("cohort", "--resolution", "coarse", "-j", jobs, stdin=text, timeout=250)
+            done = run("cohort", "--resolution", "coarse", "-j", jobs, stdin=text, timeout=1200)
             self.assertEnds(done, 0, 0)
             tables.append(without_clock(csv.DictReader(io.StringIO(done.stdout.decode()))))
         self.assertEqual(tables[0], tables[1])
         first, last = tables[0][0], tables[0][3]
         self.assertEqual(first, last)
-        alone = json.loads(run("solve", stdin=COARSE, timeout=250).stdout)
+        alone = json.loads(run("solve", stdin=COARSE, timeout=1200).stdout)
         self.assertEqual(repr(alone["strain"]["eps_max"]), tables[0][1]["eps_max"])
         self.assertEqual(repr(alone["seat"]["displacement_mm"]), tables[0][1]["seat_displacement_mm"])
 
@@ -54,7 +54,7 @@ class Solver(cli.Case):
         deck = run("export", "--inp", stdin=COARSE)
         self.assertEnds(deck, 0, 0)
         self.assertIn(b"*NODE", deck.stdout.upper())
-        self.assertEnds(run("check-tangent", timeout=250), 0, 0)
+        self.assertEnds(run("check-tangent", timeout=1200), 0, 0)
 
     def test_one_blas_thread_whatever_the_environment_says(self):
         for threads in ("1", "8"):
