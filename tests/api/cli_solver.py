@@ -31,7 +31,7 @@ class Solver(cli.Case):
         self.assertGreater(numerics["wall_s"], 0)
         self.assertGreater(numerics["cpu_s"], 0)
         self.assertTrue(0.5 < strain["eps_max"] < 3)
-        self.assertEqual(result["load_curve"][-1]["F_N"], 258)
+        self.assertLessEqual(abs(result["load_curve"][-1]["F_N"] / 258 - 1), 1e-8)
         for name in ("a.vtu", "a.svg"):
             with open(self.path(name), "rb") as file:
                 xml.dom.minidom.parseString(file.read())
