@@ -40,6 +40,7 @@ struct newton_report {
 
 struct newton; /* work space for one body: directions, gradients, masks */
 
+/* Work space for these; they stay the caller's and must outlive it. ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code newton_create(struct newton **ret, struct body *body,
                                                  struct assembly *assembly, struct seat *seat,
                                                  struct ischia_error *err);
@@ -58,8 +59,9 @@ newton_minimise(struct newton *newton, struct equilibrium *state,
 void newton_linearise(struct newton *newton, const struct equilibrium *state);
 
 /*
- * Factors the tangent of the state that the last minimisation or linearisation left: stiffness dF/dd (0 when it
- * is not positive) and the matching direction du/dd, friction limits held. ret_direction[node][3].
+ * Factors the tangent of the state that the last minimisation or linearisation left: stiffness
+ * dF/dd (0 when it is not positive) and the matching direction du/dd, friction limits held.
+ * ret_direction[node][3].
  */
 ISCHIA_MUST_CHECK enum ischia_code newton_tangent(struct newton *newton, double *ret_stiffness_N_mm,
                                                   double (*ret_direction)[3],

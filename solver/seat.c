@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Stiffness of the sticking springs per unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
+/* Stiffness of the sticking springs by unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
 static const double stick_stiffness_MPa_mm = 0.25;
 
 static double quad_area_mm2(const struct mesh *mesh, const int quad[4])
