@@ -29,6 +29,7 @@ struct problem {
     double friction;
     double d_mm;
     int steps;
+    double contact_stiffness_MPa_mm, stick_slope_MPa_mm; /* CalculiX's; 0: the exporter's own */
 };
 
 static const struct problem problems[] = {
@@ -63,7 +64,9 @@ static const struct problem problems[] = {
      .bulk_ratio = 15,
      .friction = 0.4,
      .d_mm = 10,
-     .steps = 40},
+     .steps = 40,
+     .contact_stiffness_MPa_mm = 1,
+     .stick_slope_MPa_mm = 0.5},
 };
 
 static const struct problem *find_problem(const char *name)
@@ -137,6 +140,8 @@ static enum ischia_code write_deck(const char *path, const struct problem *p, st
     struct inp_model model = {.alpha = OGDEN_ALPHA,
                               .friction = p->friction,
                               .bone_slides = p->top_flags & NODE_ON_PLATE,
+                              .contact_stiffness_MPa_mm = p->contact_stiffness_MPa_mm,
+                              .stick_slope_MPa_mm = p->stick_slope_MPa_mm,
                               .drive = INP_DISPLACEMENT_MM,
                               .drive_value = p->d_mm,
                               .title = p->name};
