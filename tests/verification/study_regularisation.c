@@ -1,0 +1,165 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * What the model's two regularisations do to eps_max: the point-wise share kappa_s of the bulk
+ * modulus (element.h), and the stiffness k of the friction springs (seat.h). Each is varied with
+ * the other at its shipped value; nothing but these numbers changes from run to run.
+ *
+ * usage: study_regularisation RESOLUTION SIDE ...    e.g. study_regularisation standard 1R 9R
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "solver/axis.h"
+#include "solver/path.h"
+#include "solver/units.h"
+
+/* Shipped values: solver.c, kappa_point_over_mu; seat.c, stick_stiffness_MPa_mm. */
+static const double shipped_kappa_point_over_mu = 5;
+static const double kappa_points_over_mu[] = {0.3, 1.25, 2.5, 5, 10};
+static const double stick_factors[] = {0.25, 1, 4, 16};
+
+struct side {
+    const char *name;
+    double param[ISCHIA_PARAM_COUNT]; /* Table 2 of Macron et al. (2020) */
+};
+static const struct side sides[] = {
+    {"1R", {6.9, 19.7, 28, 10, 8.00, 5.00, 196}},
+    {"9R", {7.3, 30.3, 19, 35, 4.50, 2.75, 429}},
+};
+
+struct variant {
+    double kappa_point_over_mu;
+    double stick_factor;
+};
+
+struct outcome {
+    struct axis_strain strain;
+    struct path_report path;
+    double d_mm, det_F_min;
+};
+
+/* Everything one solve needs. */
+struct run {
+    struct mesh mesh;
+    struct assembly assembly;
+    struct body body;
+    struct seat seat;
+    struct equilibrium state;
+};
+
+static void run_finish(struct run *r)
+{
+    free(r->state.u_mm);
+    seat_finish(&r->seat);
+    body_finish(&r->body);
+    assembly_finish(&r->assembly);
+    mesh_finish(&r->mesh);
+}
+
+static enum ischia_code run_init(struct run *r, const struct ischia_case *c,
+                                 const struct variant *v, struct ischia_error *err)
+{
+    const double mu_kPa[TISSUE_COUNT] = {[TISSUE_MUSCLE] = c->param[ISCHIA_MUM],
+                                         [TISSUE_FAT] = c->param[ISCHIA_MUF],
+                                         [TISSUE_SKIN] = c->option[ISCHIA_SKIN_MU]};
+    struct element_material material[TISSUE_COUNT];
+    for (int t = 0; t < TISSUE_COUNT; t++) {
+        const double mu = MPa_from_kPa(mu_kPa[t]);
+        material[t] = (struct element_material){mu, mu * c->option[ISCHIA_BULK_RATIO],
+                                                mu * v->kappa_point_over_mu};
+    }
+    TRY(mesh_local_init(&r->mesh, c, &mesh_divisions[c->resolution], err));
+    TRY(assembly_init(&r->assembly, &r->mesh, err));
+    TRY(body_init(&r->body, &r->mesh, material, err));
+    TRY(seat_init(&r->seat, &r->mesh, c->option[ISCHIA_FRICTION], err));
+    for (int n = 0; n < r->seat.node_count; n++)
+        r->seat.stick_stiffness_N_mm[n] *= v->stick_factor;
+    r->state.u_mm = calloc((size_t)r->mesh.node_count, sizeof *r->state.u_mm);
+    CHECK(r->state.u_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the displacements");
+    return ISCHIA_OK;
+}
+
+static enum ischia_code solve(const struct ischia_case *c, const struct variant *v,
+                              struct outcome *ret, struct ischia_error *err)
+{
+    struct run r = {0};
+    enum ischia_code code = run_init(&r, c, v, err);
+    if (code == ISCHIA_OK)
+        code = path_follow(&r.body, &r.assembly, &r.seat, quarter_force_N(c->param[ISCHIA_F]), NULL,
+                           &r.state, &ret->path, err);
+    if (code == ISCHIA_OK) {
+        const double(*u)[3] = (const double(*)[3])r.state.u_mm;
+        ret->strain = axis_strain_of(&r.mesh, u);
+        ret->d_mm = r.state.d_mm;
+        ret->det_F_min = body_det_F_min(&r.body, u);
+    }
+    run_finish(&r);
+    return code;
+}
+
+/* Solves one variant and prints its line; base NULL: this is the base. */
+static enum ischia_code show(const struct ischia_case *c, const char *side, const struct variant *v,
+                             const struct outcome *base, struct outcome *ret,
+                             struct ischia_error *err)
+{
+    TRY(solve(c, v, ret, err));
+    const double eps = (ret->strain.raw + ret->strain.recovered) / 2;
+    const double base_eps = base == NULL ? eps : (base->strain.raw + base->strain.recovered) / 2;
+    printf("%-4s %9g %9g  %-20s %8.5f %+8.3f%%  %8.5f %8.5f %9.4f %8.4f %+9.2e %5d\n", side,
+           v->kappa_point_over_mu, v->stick_factor, ischia_reason_name(ret->path.reason), eps,
+           100 * (eps / base_eps - 1), ret->strain.raw, ret->strain.recovered, ret->d_mm,
+           ret->det_F_min, ret->path.energy_residual, ret->path.newton_iterations);
+    (void)fflush(stdout);
+    return ISCHIA_OK;
+}
+
+static enum ischia_code study(const struct side *side, enum ischia_resolution resolution,
+                              struct ischia_error *err)
+{
+    struct ischia_case c = ischia_case_default();
+    const struct variant shipped = {shipped_kappa_point_over_mu, 1};
+    struct outcome base, other;
+    memcpy(c.param, side->param, sizeof side->param);
+    c.resolution = resolution;
+    TRY(show(&c, side->name, &shipped, NULL, &base, err));
+    for (size_t i = 0; i < sizeof kappa_points_over_mu / sizeof *kappa_points_over_mu; i++) {
+        const struct variant v = {kappa_points_over_mu[i], 1};
+        if (fabs(v.kappa_point_over_mu - shipped_kappa_point_over_mu) > 0)
+            TRY(show(&c, side->name, &v, &base, &other, err));
+    }
+    for (size_t i = 0; i < sizeof stick_factors / sizeof *stick_factors; i++) {
+        const struct variant v = {shipped_kappa_point_over_mu, stick_factors[i]};
+        if (fabs(v.stick_factor - 1) > 0) TRY(show(&c, side->name, &v, &base, &other, err));
+    }
+    return ISCHIA_OK;
+}
+
+static const struct side *find_side(const char *name)
+{
+    for (size_t i = 0; i < sizeof sides / sizeof *sides; i++)
+        if (strcmp(sides[i].name, name) == 0) return &sides[i];
+    return NULL;
+}
+
+int main(int argc, char **argv)
+{
+    int resolution = -1;
+    for (int i = 0; argc > 2 && i < ISCHIA_RESOLUTION_COUNT; i++)
+        if (strcmp(argv[1], ischia_resolution_names[i]) == 0) resolution = i;
+    if (resolution < 0) {
+        fprintf(stderr, "usage: study_regularisation coarse|standard|fine SIDE ...\n");
+        return 2;
+    }
+    printf("side  kappa_s/mu k/shipped reason  eps_max change raw recovered d_mm det_F energy n\n");
+    for (int i = 2; i < argc; i++) {
+        struct ischia_error err;
+        const struct side *side = find_side(argv[i]);
+        if (side == NULL || study(side, (enum ischia_resolution)resolution, &err) != ISCHIA_OK) {
+            fprintf(stderr, "%s: %s\n", argv[i], side == NULL ? "no such side" : err.message);
+            return 1;
+        }
+    }
+    return 0;
+}
