@@ -49,6 +49,8 @@ enum ischia_code block_init(struct mesh *ret, const double size_mm[3], const int
     struct mesh mesh = {.node_count = (m[0] + 1) * (m[1] + 1) * (m[2] + 1),
                         .element_count = m[0] * m[1] * m[2],
                         .muscle_count = m[0] * m[1] * m[2],
+                        .tip_z_mm = size_mm[2],
+                        .top_z_mm = size_mm[2],
                         .seat_quad_count = m[0] * m[1],
                         .outer_skin_quad_count = m[0] * m[1]};
     mesh.X_mm = calloc((size_t)mesh.node_count, sizeof *mesh.X_mm);

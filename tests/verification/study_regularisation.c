@@ -74,8 +74,7 @@ static enum ischia_code run_init(struct run *r, const struct ischia_case *c,
     TRY(assembly_init(&r->assembly, &r->mesh, err));
     TRY(body_init(&r->body, &r->mesh, material, err));
     TRY(seat_init(&r->seat, &r->mesh, c->option[ISCHIA_FRICTION], err));
-    for (int n = 0; n < r->seat.node_count; n++)
-        r->seat.stick_stiffness_N_mm[n] *= v->stick_factor;
+    for (int n = 0; n < r->seat.node_count; n++) r->seat.stick_stiffness_N_mm[n] *= v->stick_factor;
     r->state.u_mm = calloc((size_t)r->mesh.node_count, sizeof *r->state.u_mm);
     CHECK(r->state.u_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the displacements");
     return ISCHIA_OK;
