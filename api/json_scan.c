@@ -115,7 +115,7 @@ static bool number(struct scan *s)
         end++;
     if (end - s->at > TEXT_NUMBER_LENGTH_MAX) return wanted(s, "a number of at most 60 characters");
     if (!text_to_number(s->text + s->at, end - s->at, &ignored))
-        return wanted(s, "a number such as -1.5e3");
+        return wanted(s, "a number such as -1.5e3 (NaN and Infinity are not JSON)");
     s->at = end;
     return true;
 }

@@ -20,7 +20,8 @@ enum ischia_code file_open(const char *path, FILE **ret, struct ischia_error *er
         return ISCHIA_OK;
     }
     FILE *in = fopen(path, "re");
-    CHECK(in != NULL, err, ISCHIA_E_INPUT, "cannot open %s: %s", path, strerror(errno));
+    CHECK(in != NULL, err, errno == ENOMEM ? ISCHIA_E_MEMORY : ISCHIA_E_INPUT, "cannot open %s: %s",
+          path, strerror(errno));
     if (fstat(fileno(in), &status) == 0 && S_ISDIR(status.st_mode)) {
         (void)fclose(in);
         return FAIL(err, ISCHIA_E_INPUT, "%s is a directory; give a file", path);
@@ -77,9 +78,10 @@ static enum ischia_code open_temporary(struct file_out *ret, struct ischia_error
     char *name;
     CHECK(asprintf(&name, "%s.XXXXXX", ret->path) >= 0, err, ISCHIA_E_MEMORY, "out of memory");
     const int fd = mkostemp(name, O_CLOEXEC);
-    const int reason = errno;
     ret->stream = fd >= 0 ? fdopen(fd, "w") : NULL;
     if (ret->stream == NULL) {
+        const int reason = errno;
+        if (fd >= 0) (void)unlink(name);
         if (fd >= 0) (void)close(fd);
         free(name);
         return FAIL(err, ISCHIA_E_IO, "cannot write %s: %s", ret->path, strerror(reason));
