@@ -1,22 +1,20 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Anything a worker could send: frames cut anywhere, and the messages in them. The first byte says
  * how many bytes arrive at a time. */
-#include <assert.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/frame.h"
 #include "server/message.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+#include "tests/fuzz/fuzz.h"
 
 static void look_at(const struct frame *frame)
 {
     struct message message;
     struct ischia_error err;
     if (frame->kind != FRAME_JSON) return;
-    assert(frame->bytes[frame->size] == '\0' && strlen(frame->bytes) == frame->size);
+    MUST(frame->bytes[frame->size] == '\0' && strlen(frame->bytes) == frame->size);
     if (message_read(frame->bytes, frame->size, &message, &err) == ISCHIA_OK)
         free(message.case_json);
     (void)message_is_object(frame->bytes, frame->size);
@@ -29,7 +27,7 @@ static int take_all(struct frame_reader *reader)
     struct ischia_error err;
     do {
         if (frame_reader_next(reader, &frame, &err) != ISCHIA_OK) {
-            assert(frame_reader_next(reader, &frame, &err) == ISCHIA_E_INPUT);
+            MUST(frame_reader_next(reader, &frame, &err) == ISCHIA_E_INPUT);
             return 0;
         }
         look_at(&frame);
