@@ -23,6 +23,7 @@ static const struct command {
     {"export", command_export, "write the model for CalculiX, ParaView or as a drawing"},
     {"check-tangent", command_check_tangent, "compare derivatives with finite differences"},
     {"version", command_version, "versions of the program, the model and the libraries"},
+    {"worker", command_worker, NULL},
     {"help", command_help, "show this, or the help of a command"},
 };
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
@@ -84,10 +85,12 @@ static int command_help(int argc, char **argv)
 /*
  * A BLAS with threads sums in an order that depends on them, and OpenBLAS starts its threads when
  * it is loaded, before main: so the environment is set and the program started once more.
+ * CHOLMOD asks OpenMP for four threads by number; only the limit stops that.
  */
 static void ensure_one_blas_thread(char **argv)
 {
-    static const char *const names[] = {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"};
+    static const char *const names[] = {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS",
+                                        "OMP_THREAD_LIMIT"};
     bool changed = false;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         const char *value = getenv(names[i]);

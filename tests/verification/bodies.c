@@ -83,15 +83,15 @@ enum ischia_code bench_init(struct bench *b, const struct element_material mater
     TRY(newton_create(&b->newton, &b->body, &b->assembly, &b->seat, err));
     b->state.u_mm = calloc((size_t)b->mesh.node_count, sizeof *b->state.u_mm);
     b->normal_before_N = calloc((size_t)b->mesh.node_count, sizeof *b->normal_before_N);
-    CHECK(b->state.u_mm && b->normal_before_N, err, ISCHIA_E_MEMORY,
+    CHECK(b->state.u_mm != NULL && b->normal_before_N != NULL, err, ISCHIA_E_MEMORY,
           "not enough memory for the state");
     return ISCHIA_OK;
 }
 
 void bench_finish(struct bench *b)
 {
-    free(b->state.u_mm);
     free(b->normal_before_N);
+    free(b->state.u_mm);
     newton_destroy(b->newton);
     seat_finish(&b->seat);
     assembly_finish(&b->assembly);
