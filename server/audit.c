@@ -66,7 +66,7 @@ static bool seen_lately(struct audit *audit, const char *who, const char *what, 
                            (long long)(now_ms / MINUTE_MS));
     (void)crypto_shorthash(hash, (const unsigned char *)text, n > 0 ? (size_t)n : 0, audit->key);
     memcpy(&value, hash, sizeof value);
-    return atomic_exchange(&audit->recent[value % RECENT], value) == value;
+    return atomic_exchange(&audit->recent[(size_t)value % RECENT], value) == value;
 }
 
 bool audit_read(struct audit *audit, const char *who, const char *what, const char *id,

@@ -27,7 +27,6 @@ struct config {
     char tls_key[CONFIG_TEXT_BYTES];
     char allowed_hosts[CONFIG_TEXT_BYTES];
     char allowed_origins[CONFIG_TEXT_BYTES];
-    char static_dir[CONFIG_TEXT_BYTES];
     char worker_program[CONFIG_TEXT_BYTES];
     bool behind_proxy;
     bool sandbox;

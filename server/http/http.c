@@ -52,6 +52,7 @@ struct connection {
 enum step { STEP_HEAD, STEP_BODY, STEP_ANSWER };
 
 struct http_exchange {
+    atomic_int references; /* the library's, the stream's, and those of http_hold */
     struct http_request request;
     struct http_server *server;
     struct connection *connection;
@@ -188,6 +189,17 @@ void http_wake(struct http_exchange *exchange)
     if (exchange->suspended) resume(exchange);
     else exchange->wake_pending = true;
     (void)pthread_mutex_unlock(&server->lock);
+}
+
+void http_hold(struct http_exchange *exchange)
+{
+    (void)atomic_fetch_add_explicit(&exchange->references, 1, memory_order_relaxed);
+}
+
+void http_release(struct http_exchange *exchange)
+{
+    if (atomic_fetch_sub_explicit(&exchange->references, 1, memory_order_acq_rel) == 1)
+        free(exchange);
 }
 
 /* Parks the exchange until http_wake or wake_at_ms. False when it was woken already: go on. */
@@ -355,6 +367,7 @@ static void *on_uri(void *context, const char *uri, struct MHD_Connection *mhd)
     if (x == NULL) return NULL;
     memcpy(x->target, uri, length + 1);
     const char *question = strchr(x->target, '?');
+    atomic_store_explicit(&x->references, 1, memory_order_relaxed);
     x->server = server;
     x->connection = connection;
     x->mhd = mhd;
@@ -384,7 +397,7 @@ static void on_completed(void *context, struct MHD_Connection *mhd, void **reque
     if (x->refusal != NULL) http_response_finish(x->refusal);
     free(x->refusal);
     free(x->body);
-    free(x);
+    http_release(x);
 }
 
 static ssize_t read_stream(void *context, uint64_t position, char *buffer, size_t room)
@@ -400,11 +413,12 @@ static ssize_t read_stream(void *context, uint64_t position, char *buffer, size_
     }
 }
 
-/* The library ends a stream's response before it reports the request as completed. */
+/* The library may do this after on_completed: the stream holds the exchange. */
 static void close_stream(void *context)
 {
     struct http_exchange *x = context;
     x->stream.close(x->stream.state);
+    http_release(x);
 }
 
 static struct MHD_Response *make_stream(struct http_exchange *x, struct http_response *response)
@@ -412,7 +426,9 @@ static struct MHD_Response *make_stream(struct http_exchange *x, struct http_res
     x->stream = response->stream;
     struct MHD_Response *made = MHD_create_response_from_callback(
         MHD_SIZE_UNKNOWN, STREAM_BLOCK_BYTES, read_stream, x, close_stream);
-    if (made != NULL) response->action = HTTP_SEND; /* the library closes the stream from now on */
+    if (made == NULL) return NULL;
+    http_hold(x);
+    response->action = HTTP_SEND; /* the library closes the stream from now on */
     return made;
 }
 
@@ -717,7 +733,7 @@ enum ischia_code http_start(struct http_server **ret, const struct http_options 
         code = listen_open(options->listen, &server->listen_fd, server->address, err);
     if (code == ISCHIA_OK) code = start_daemon(server, err);
     if (code == ISCHIA_OK) *ret = server;
-    else http_stop(server);
+    else http_destroy(server);
     return code;
 }
 
@@ -757,12 +773,21 @@ void http_stop(struct http_server *server)
     http_quiesce(server);
     await_waiting(server);
     if (server->daemon != NULL) MHD_stop_daemon(server->daemon);
+    server->daemon = NULL;
     atomic_store(&server->ticker_stops, true);
     (void)pthread_mutex_lock(&server->lock);
     (void)pthread_cond_signal(&server->tick);
     (void)pthread_mutex_unlock(&server->lock);
     if (server->ticker_runs) (void)pthread_join(server->ticker, NULL);
+    server->ticker_runs = false;
     if (server->listen_fd >= 0) (void)close(server->listen_fd);
+    server->listen_fd = -1;
+}
+
+void http_destroy(struct http_server *server)
+{
+    if (server == NULL) return;
+    http_stop(server);
     (void)pthread_cond_destroy(&server->tick);
     (void)pthread_mutex_destroy(&server->lock);
     (void)pthread_mutex_destroy(&server->connections_lock);

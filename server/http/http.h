@@ -150,12 +150,16 @@ const char *http_address(const struct http_server *server);
 /* Accepts no more connections and wakes every wait and stream, so that they can end. */
 void http_quiesce(struct http_server *server);
 bool http_is_stopping(const struct http_server *server);
-/* http_quiesce, then waits for requests under way and frees all. NULL allowed. */
+/* http_quiesce, then waits for requests under way: no callback runs after it. NULL allowed. */
 void http_stop(struct http_server *server);
+/* http_stop, and frees all; after every http_release. NULL allowed. */
+void http_destroy(struct http_server *server);
 
-/* Calls on_request, or the stream's read, of this exchange again soon. Cheap; any thread; only
- * while the exchange lives: waits registered elsewhere must end before on_done or close returns. */
+/* Calls on_request, or the stream's read, of this exchange again soon. Cheap; any thread. Who may
+ * call it after on_done (a client can leave at any time) holds the exchange first. */
 void http_wake(struct http_exchange *exchange);
+void http_hold(struct http_exchange *exchange);
+void http_release(struct http_exchange *exchange);
 
 int64_t http_now_ms(void); /* the monotonic clock of wake_at_ms */
 
