@@ -47,8 +47,8 @@ ISCHIA_MUST_CHECK enum ischia_code case_doc_read(struct ischia_request *ret, con
                                                  struct doc_faults *faults,
                                                  struct ischia_error *err);
 
-/* The same from a parsed value, for documents that hold a case; never fails, only adds faults. */
-void case_doc_read_value(struct ischia_request *ret, const struct json *value, const char *pointer,
+/* The same from a parsed value; never fails, only adds faults. */
+void case_doc_read_value(struct ischia_request *ret, const struct json *value,
                          struct doc_faults *faults);
 
 /*
@@ -62,25 +62,28 @@ case_doc_read_form(struct ischia_request *ret, const char *body, size_t length, 
 
 /*
  * Field by field, for forms and CSV rows: init, set each, end. The key is one of JSON's keys in any
- * accepted spelling or "group.key"; an empty value is the same as none.
+ * accepted spelling or "group.key"; space around a value is ignored and an empty value is none.
  */
 struct case_doc_fields {
     struct ischia_request *request;
     struct doc_faults *faults;
-    unsigned seen; /* bit i: key i of the table was given */
-    double
-        option[ISCHIA_OPTION_COUNT]; /* given one by one: NaN: not given; applied over the preset */
+    unsigned seen;                      /* bit k: key k of the table was given             */
+    double option[ISCHIA_OPTION_COUNT]; /* NaN: not given; applied over the preset at the end */
 };
 void case_doc_fields_init(struct case_doc_fields *ret, struct ischia_request *request,
                           struct doc_faults *faults);
 void case_doc_fields_set(struct case_doc_fields *fields, const char *key, const char *value);
 void case_doc_fields_end(struct case_doc_fields *fields); /* options, limits, what is missing */
 
-/* The canonical spelling of a key that fields_set knows ("muM" for "\u00b5M", "skin.mu"); NULL
- * when there is no such key. `length` bytes of key. */
-const char *case_doc_canonical_key(const char *key, size_t length);
+/* The canonical spelling of a key that fields_set knows ("muM" for U+00B5 M, "skin.mu"), static;
+ * NULL when there is no such key. */
+const char *case_doc_canonical_key(const char *key);
 
-/* The known key that a mistyped one probably means, NULL when none is near. */
+/* The canonical key that a CSV column stands for: as above, or with its unit behind it, as in
+ * "R1_mm" and "muM_kPa"; NULL when it is some other column. */
+const char *case_doc_column_key(const char *column);
+
+/* The known key that a mistyped one probably means, static; NULL when none is near. */
 const char *case_doc_nearest_key(const char *key);
 
 /* Writers, into the object that is open in out; reading back gives the same request, bit for bit. */

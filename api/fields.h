@@ -14,18 +14,20 @@
 enum field_kind {
     FIELD_NUMBER,         /* double, finite                                             */
     FIELD_NUMBER_OR_NULL, /* double; NaN <-> null                                       */
+    FIELD_NUMBER_OR_NONE, /* double; NaN: the member is left out                        */
     FIELD_NUMBERS,        /* double[count] <-> array of exactly count numbers           */
     FIELD_CONSTANT,       /* constant: written, not read                                */
     FIELD_INTEGER,        /* int                                                        */
     FIELD_BOOL,           /* bool                                                       */
     FIELD_TEXT,           /* char[size]                                                 */
     FIELD_TEXT_OR_NULL,   /* char[size]; "" <-> null                                    */
+    FIELD_TEXT_OR_NONE,   /* char[size]; "": the member is left out */
     FIELD_WORD,           /* int (an enum), one of words[count]                         */
     FIELD_WORD_OR_NULL,   /* the same; 0 <-> null, words[0] is never written            */
     FIELD_OBJECT,         /* a struct described by fields                               */
     FIELD_LIST,           /* an array of at most count structs of size bytes described by fields;
                              an int at length_offset says how many                      */
-    FIELD_CUSTOM          /* custom_write and custom_read                               */
+    FIELD_CUSTOM          /* custom_write; custom_read, NULL: not read                  */
 };
 
 struct field {
@@ -44,7 +46,7 @@ struct field {
     bool (*present)(const void *base);
     void (*set_present)(void *base, bool present);
     void (*custom_write)(struct json_out *out, const char *key, const void *base);
-    bool (*custom_read)(const struct json *value, void *base); /* false: adds a wrong_type fault */
+    bool (*custom_read)(const struct json *value, void *base); /* false: of the wrong kind */
     bool optional; /* may be missing when read: the member keeps its value */
 };
 

@@ -71,13 +71,14 @@ const struct json *json_member(const struct json *object, const char *key);
 
 /*
  * Writes one document into a text_out. Inside an object every call has a key; inside an array and
- * at the top the key is NULL. Failures are remembered in the text_out; a number that is not finite
- * is a bug of the caller (asserted): use json_put_number_or_null where NaN means "none".
+ * at the top the key is NULL. Failures are remembered and reported once, by json_out_take. A number
+ * that is not finite is such a failure: use json_put_number_or_null where NaN means "none".
  */
 struct json_out {
     struct text_out text;
     int indent;      /* spaces a level; 0: all on one line, without spaces */
     int depth;       /* open arrays and objects                             */
+    bool not_finite; /* a number could not be written                      */
     bool has_member; /* the innermost open one already has a member         */
 };
 
@@ -96,7 +97,8 @@ void json_put_string(struct json_out *out, const char *key, const char *utf8); /
 /* json: a complete value that json_out or json_parse has already vouched for; copied as it is. */
 void json_put_raw(struct json_out *out, const char *key, const char *json);
 
-/* The finished document (every array and object closed, asserted), as text_out_take. */
+/* The finished document (every array and object closed, asserted), as text_out_take; out is empty
+ * afterwards. ISCHIA_E_NUMERIC when a number was not finite. */
 ISCHIA_MUST_CHECK enum ischia_code json_out_take(struct json_out *out, char **ret_text,
                                                  size_t *ret_length, struct ischia_error *err);
 

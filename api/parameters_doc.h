@@ -8,13 +8,13 @@
  * GET /v1/parameters, from the tables of solver/case.h and api/risk.h:
  * {
  *   "model": { "name", "version" },
- *   "parameters": [ { "key", "symbol", "aliases": ["..."], "unit", "description",
+ *   "parameters": [ { "key", "aliases": ["..."], "unit", "description",
  *                     "accepted": { "min", "max" }, "studied": { "min", "max" } } ],
  *   "options": [ { "group", "key", "pointer", "unit", "description",
  *                  "accepted": { "min", "max" }, "default" } ],
  *   "presets": [ { "name", "description", "skin": { ... }, "model": { ... } } ],
  *   "resolutions": [ { "name", "default": true } ],
- *   "fields": [ { "key", "description", "pattern" | "values" | "max_length" } ],   subject, side, ...
+ *   "fields": [ { "key", "description", "pattern" (null: none), "max_length" } ], subject, side ...
  *   "thresholds": { "E_shear": 0.75, "E_comp": 0.45, "measure": "green_lagrange" },
  *   "bands": [ { "name", "headline" } ],
  *   "caveats": [ "..." ]

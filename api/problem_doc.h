@@ -30,11 +30,11 @@ enum problem_kind {
     PROBLEM_INTERNAL,          /* 500                                                    */
     PROBLEM_UNAVAILABLE,       /* 503 shutting down, or the store cannot be written      */
     PROBLEM_STORAGE,           /* 507 no room left                                       */
-    /* Why an assessment failed; their status is that of the document that carries them. */
-    PROBLEM_NOT_CONVERGED,
-    PROBLEM_OUT_OF_MEMORY,
-    PROBLEM_TIME_LIMIT,
-    PROBLEM_WORKER_DIED,
+    /* Why an assessment failed: */
+    PROBLEM_NOT_CONVERGED, /* 422 the solver found no equilibrium, and says how far it came */
+    PROBLEM_OUT_OF_MEMORY, /* 503                                                    */
+    PROBLEM_TIME_LIMIT,    /* 504                                                    */
+    PROBLEM_WORKER_DIED,   /* 500                                                    */
     PROBLEM_KIND_COUNT
 };
 
