@@ -32,7 +32,7 @@ struct store;
 
 enum { STORE_DIGEST_BYTES = 32 };
 enum { STORE_LIST_LIMIT_MAX = 500, STORE_CURSOR_BYTES = 40 };
-enum { STORE_IDEMPOTENCY_MS = 24 * 60 * 60 * 1000 };
+enum { STORE_IDEMPOTENCY_MS = 24 * 60 * 60 * 1000 }; /* the default */
 
 enum store_answer {
     STORE_DONE,
@@ -49,10 +49,11 @@ enum store_mode {
 };
 
 struct store_options {
-    const char *location; /* the state directory; the engine chooses the names inside     */
+    const char *location; /* the state directory; the engine chooses the names inside      */
     enum store_mode mode;
-    int busy_timeout_ms;     /* how long to wait for another process' write; 0: 5000         */
-    int64_t (*now_ms)(void); /* the clock; NULL: the system's                                */
+    int busy_timeout_ms;     /* how long to wait for another process' write; 0: 5000          */
+    int64_t idempotency_ms;  /* how long an idempotency key is remembered; 0: 24 h            */
+    int64_t (*now_ms)(void); /* the clock; NULL: the system's                                 */
 };
 
 /*
