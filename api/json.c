@@ -149,3 +149,5 @@ const struct json *json_member(const struct json *object, const char *key)
         if (strcmp(json_key(m), key) == 0) return m;
     return NULL;
 }
+
+const char *json_library_version(void) { return cJSON_Version(); }

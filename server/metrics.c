@@ -17,8 +17,12 @@ struct metric_info {
 static const struct metric_info counter_info[METRIC_COUNTER_COUNT] = {
     [METRIC_ASSESSMENTS_ACCEPTED] = {"ischia_assessments_accepted_total",
                                      "Assessments durably accepted."},
-    [METRIC_WORKER_RESTARTS] = {"ischia_worker_restarts_total",
-                                "Worker processes started to replace one that ended."},
+    [METRIC_WORKER_DEATHS] = {"ischia_worker_deaths_total",
+                              "Worker processes that ended on their own or had to be ended."},
+    [METRIC_WORKER_STARTS] = {"ischia_worker_starts_total",
+                              "Worker processes started; the first ones and replacements."},
+    [METRIC_STORE_COMMITS] = {"ischia_store_commits_total", "Transactions committed."},
+    [METRIC_STORE_FAILURES] = {"ischia_store_failures_total", "Writes that the store refused."},
     [METRIC_REFUSED_RATE] = {"ischia_refused_rate_total", "Requests over a client's rate limit."},
     [METRIC_REFUSED_AUTH] = {"ischia_refused_auth_total",
                              "Requests without a valid token or scope."},
@@ -35,6 +39,7 @@ static const struct metric_info gauge_info[METRIC_GAUGE_COUNT] = {
                                       "Age of the assessment that has waited longest."},
     [METRIC_WORKERS] = {"ischia_workers", "Worker processes alive."},
     [METRIC_WORKERS_BUSY] = {"ischia_workers_busy", "Worker processes that are solving."},
+    [METRIC_STORE_BYTES] = {"ischia_store_bytes", "Size of the store's files."},
     [METRIC_CONNECTIONS] = {"ischia_http_connections", "Connections open."},
     [METRIC_EVENT_STREAMS] = {"ischia_http_event_streams", "Event streams open."},
 };
@@ -133,6 +138,13 @@ void metrics_http(size_t route, int status, double seconds)
     (void)atomic_fetch_add_explicit(&route_status[route][status_index(status)], 1,
                                     memory_order_relaxed);
     observe(&route_seconds[route], fast_bounds, COUNT_OF(fast_bounds), seconds);
+}
+
+int64_t metrics_now_us(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
 static void print_head(FILE *out, const char *name, const char *type, const char *help)

@@ -13,7 +13,10 @@
 
 enum metric_counter {
     METRIC_ASSESSMENTS_ACCEPTED,
-    METRIC_WORKER_RESTARTS,
+    METRIC_WORKER_DEATHS,
+    METRIC_WORKER_STARTS,
+    METRIC_STORE_COMMITS,
+    METRIC_STORE_FAILURES,
     METRIC_REFUSED_RATE,
     METRIC_REFUSED_AUTH,
     METRIC_REFUSED_ORIGIN,
@@ -27,6 +30,7 @@ enum metric_gauge {
     METRIC_OLDEST_QUEUED_SECONDS,
     METRIC_WORKERS,
     METRIC_WORKERS_BUSY,
+    METRIC_STORE_BYTES,
     METRIC_CONNECTIONS,
     METRIC_EVENT_STREAMS,
     METRIC_GAUGE_COUNT
@@ -48,6 +52,9 @@ void metrics_store(enum metric_store kind, double seconds);
 void metrics_set_routes(const char *const *names, size_t count);
 /* `route` is an index into those names; any other value counts as "none" (no such path). */
 void metrics_http(size_t route, int status, double seconds);
+
+/* A monotonic clock, in microseconds, for the times above. */
+int64_t metrics_now_us(void);
 
 /* Writes everything. `model` is "name-version" of the mechanical model. */
 void metrics_print(FILE *out, const char *model);

@@ -94,6 +94,8 @@ const char *const http_method_names[HTTP_METHOD_COUNT] = {
     [HTTP_OPTIONS] = "OPTIONS", [HTTP_OTHER] = "",
 };
 
+const char *http_library_version(void) { return MHD_get_version(); }
+
 int64_t http_now_ms(void)
 {
     struct timespec now;
@@ -451,13 +453,19 @@ static void compress(struct http_exchange *x, struct http_response *response)
     size_t size = 0;
     if (!response->compressible) return;
     http_header_static(response, "Vary", "Accept-Encoding");
-    if (!x->gzip || !gzip_helps(response->size)) return;
-    if (gzip_pack(response->bytes, response->size, &packed, &size) != ISCHIA_OK) return;
-    if (response->release != NULL) response->release(response->owner);
-    response->bytes = packed;
-    response->size = size;
-    response->release = free;
-    response->owner = packed;
+    if (!x->gzip || response->status == 304) return;
+    if (response->packed != NULL) {
+        response->bytes = response->packed;
+        response->size = response->packed_size;
+    } else {
+        if (!gzip_helps(response->size)) return;
+        if (gzip_pack(response->bytes, response->size, &packed, &size) != ISCHIA_OK) return;
+        if (response->release != NULL) response->release(response->owner);
+        response->bytes = packed;
+        response->size = size;
+        response->release = free;
+        response->owner = packed;
+    }
     http_header_static(response, "Content-Encoding", "gzip");
     gzip_mark_etag(response->etag, sizeof response->etag);
 }

@@ -78,6 +78,8 @@ struct http_response {
     size_t size;
     void (*release)(void *owner); /* frees the body when it was sent; NULL: static bytes   */
     void *owner;
+    const char *packed; /* the same body as gzip, in static storage; NULL: none ready       */
+    size_t packed_size;
     bool compressible; /* gzip it for clients that take it                              */
     bool close;        /* the connection ends with this answer                          */
     char etag[HTTP_ETAG_BYTES]; /* with its quotes; "": none                           */
@@ -161,6 +163,7 @@ void http_wake(struct http_exchange *exchange);
 void http_hold(struct http_exchange *exchange);
 void http_release(struct http_exchange *exchange);
 
+const char *http_library_version(void); /* "0.9.75" */
 int64_t http_now_ms(void); /* the monotonic clock of wake_at_ms */
 
 #endif
