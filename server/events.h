@@ -65,8 +65,8 @@ size_t events_read(struct events *events, const struct uuid *topic, uint64_t aft
 /* The latest progress fraction of a running assessment; false when none is known. */
 bool events_fraction(struct events *events, const struct uuid *topic, double *ret_fraction);
 
-/* Publishes one event (its id and at_ms are filled in here). When memory is short the ring's oldest
- * or the event itself is dropped, but a subscriber is still woken. */
+/* Publishes one event (its id and at_ms are filled in here) and wakes who listens. A full ring drops
+ * its oldest. Only an event that nobody listens to can be dropped for want of memory. */
 void events_publish(struct events *events, const struct uuid *topic, const struct event *event);
 
 /* Forgets topics that ended more than `age_ms` ago and have no subscriber. */

@@ -67,10 +67,11 @@ void frame_reader_filled(struct frame_reader *reader, size_t size);
 ISCHIA_MUST_CHECK enum ischia_code
 frame_reader_next(struct frame_reader *reader, struct frame *ret_frame, struct ischia_error *err);
 
-/* One read(2) into the reader. *ret_closed: end of file. A nonblocking descriptor without data is
- * ISCHIA_OK with nothing read. */
+/* One read(2) into the reader. *ret_closed: end of file. *ret_got: bytes read; 0 also when a
+ * nonblocking descriptor has none now. */
 ISCHIA_MUST_CHECK enum ischia_code frame_reader_read(struct frame_reader *reader, int fd,
-                                                     bool *ret_closed, struct ischia_error *err);
+                                                     size_t *ret_got, bool *ret_closed,
+                                                     struct ischia_error *err);
 
 /* Blocks until a frame is there. FRAME_NONE: the peer closed between frames; closing inside one is
  * ISCHIA_E_IO. */

@@ -41,7 +41,8 @@ struct pool_options {
 
 struct pool_job {
     struct uuid id;
-    int64_t attempt;
+    int64_t attempt; /* this and crashes are the host's: the pool only carries them           */
+    int crashes;
     char *case_json; /* owned by the pool once handed over                                    */
 };
 

@@ -4,6 +4,7 @@
  * With n callers waiting one fsync serves all n, so that accepting gets cheaper under load.
  */
 #include <semaphore.h>
+#include <signal.h>
 #include <string.h>
 #include <time.h>
 
@@ -167,6 +168,9 @@ static struct write *batch_end(struct write *first)
 static void *writer_main(void *argument)
 {
     struct store *store = argument;
+    sigset_t all; /* signals are the main thread's */
+    (void)sigfillset(&all);
+    (void)pthread_sigmask(SIG_BLOCK, &all, NULL);
     for (bool closing = false;;) {
         struct write *first = take_waiting(store, &closing);
         if (first == NULL && closing) return NULL;
