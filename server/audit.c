@@ -64,9 +64,11 @@ static bool seen_lately(struct audit *audit, const char *who, const char *what, 
     unsigned long long value = 0;
     const int n = snprintf(text, sizeof text, "%.48s|%.48s|%.48s|%lld", who, what, id,
                            (long long)(now_ms / MINUTE_MS));
-    (void)crypto_shorthash(hash, (const unsigned char *)text, n > 0 ? (size_t)n : 0, audit->key);
+    if (n < 0) return false;
+    (void)crypto_shorthash(hash, (const unsigned char *)text, (unsigned long long)n, audit->key);
     memcpy(&value, hash, sizeof value);
-    return atomic_exchange(&audit->recent[(size_t)value % RECENT], value) == value;
+    atomic_ullong *slot = &audit->recent[value % RECENT];
+    return atomic_exchange(slot, value) == value;
 }
 
 bool audit_read(struct audit *audit, const char *who, const char *what, const char *id,

@@ -18,7 +18,7 @@
  * back), and then, if the client prefers, for the end of the solve.
  */
 
-enum { WAIT_MAX_S = 60, IDEMPOTENCY_KEY_BYTES = 256 };
+enum { WAIT_MAX_S = 60, IDEMPOTENCY_KEY_BYTES = 256, STOP_WAIT_MS = 10000 };
 static const int64_t for_ever_ms = INT64_MAX / 4;
 
 static double seconds_since(int64_t begun_us) { return (double)(metrics_now_us() - begun_us) / 1e6; }
@@ -362,6 +362,9 @@ void handle_submit(struct call *call, struct http_response *ret)
         begin_submit(call, ret);
     } else if (atomic_load(&call->deferred->done)) {
         finish_submit(call, ret);
+    } else if (http_is_stopping(call->service->http) &&
+               http_now_ms() > call->request->begun_ms + STOP_WAIT_MS) {
+        ret->action = HTTP_DROP; /* the disk hangs: neither yes nor no would be true */
     } else {
         ret->action = HTTP_WAIT;
         ret->wake_at_ms = for_ever_ms;
@@ -381,7 +384,10 @@ void handle_cancel(struct call *call, struct http_response *ret)
     else if (answer == STORE_CONFLICT && was != QUEUE_CANCELLED)
         reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This assessment has ended: %s.",
                       queue_state_names[was]);
-    else read_and_render(call, 0, ret); /* cancelling twice is no fault */
+    else if (is_form(call)) { /* the plain report's button */
+        ret->status = 303;
+        http_header(ret, "Location", "/v1/assessments/%s/report", call->id_text);
+    } else read_and_render(call, 0, ret); /* cancelling twice is no fault */
 }
 
 void handle_erase(struct call *call, struct http_response *ret)

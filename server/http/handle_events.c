@@ -124,7 +124,7 @@ static uint64_t last_seen(const struct call *call)
 {
     const char *header = http_request_header(call->request, "Last-Event-ID");
     long long id = 0;
-    if (header == NULL || !query_integer(header, 0, INT64_MAX, &id)) return 0;
+    if (header == NULL || !query_whole_number(header, 0, INT64_MAX, &id)) return 0;
     return (uint64_t)id;
 }
 

@@ -140,6 +140,8 @@ static void draw(struct call *call, const struct drawing *drawing, struct http_r
         begin_drawing(call, drawing, ret);
     } else if (atomic_load(&call->deferred->done)) {
         finish_drawing(call, drawing, ret);
+    } else if (http_is_stopping(call->service->http)) {
+        reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE, "The service is shutting down.");
     } else {
         ret->action = HTTP_WAIT;
         ret->wake_at_ms = INT64_MAX / 4;

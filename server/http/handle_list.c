@@ -52,7 +52,7 @@ static void read_status(struct list_query *q)
 static void read_limit(struct list_query *q)
 {
     long long limit = LIMIT_USUAL;
-    if (q->limit[0] != '\0' && !query_integer(q->limit, 1, STORE_LIST_LIMIT_MAX, &limit))
+    if (q->limit[0] != '\0' && !query_whole_number(q->limit, 1, STORE_LIST_LIMIT_MAX, &limit))
         doc_faults_add(&q->faults, "limit", "out_of_range", "limit is 1 to %d",
                        STORE_LIST_LIMIT_MAX);
     q->filter.limit = (int)limit;
@@ -277,8 +277,8 @@ static bool read_changes_query(struct call *call, long long *ret_since, long lon
     const enum query_answer l = query_find(call->request->query, "limit", limit, sizeof limit);
     const bool good =
         s != QUERY_BAD && l != QUERY_BAD &&
-        (s == QUERY_ABSENT || query_integer(since, 0, INT64_MAX, ret_since)) &&
-        (l == QUERY_ABSENT || query_integer(limit, 1, STORE_LIST_LIMIT_MAX, ret_limit));
+        (s == QUERY_ABSENT || query_whole_number(since, 0, INT64_MAX, ret_since)) &&
+        (l == QUERY_ABSENT || query_whole_number(limit, 1, STORE_LIST_LIMIT_MAX, ret_limit));
     if (!good)
         reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
                       "since is a number from an earlier answer, limit is 1 to %d.",

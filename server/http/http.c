@@ -761,17 +761,18 @@ void http_quiesce(struct http_server *server)
     (void)pthread_mutex_unlock(&server->lock);
 }
 
-/* The library must not be stopped while an exchange waits: each is woken until none is left. */
+/* The library must not be stopped while an exchange waits. Each is woken again and again until it
+ * has answered: the application gives up its own waits once http_is_stopping. */
 static void await_waiting(struct http_server *server)
 {
     static const struct timespec pause = {.tv_sec = 0, .tv_nsec = 10 * 1000 * 1000};
-    bool some = true;
-    for (int i = 0; some && i < 500; i++) {
+    int idle_rounds = 0;
+    while (idle_rounds < 2) {
         (void)pthread_mutex_lock(&server->lock);
-        some = server->waiting != NULL;
+        idle_rounds = server->waiting == NULL ? idle_rounds + 1 : 0;
         while (server->waiting != NULL) resume(server->waiting);
         (void)pthread_mutex_unlock(&server->lock);
-        if (some) (void)nanosleep(&pause, NULL);
+        (void)nanosleep(&pause, NULL);
     }
 }
 

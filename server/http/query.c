@@ -97,7 +97,7 @@ bool query_unknown(const char *query, const char *const *known, char *ret, size_
     return false;
 }
 
-bool query_integer(const char *text, long long min, long long max, long long *ret)
+bool query_whole_number(const char *text, long long min, long long max, long long *ret)
 {
     char *end = NULL;
     if (text[0] == '\0' || strspn(text, "0123456789") != strlen(text)) return false;
@@ -121,7 +121,7 @@ int query_prefer_wait(const char *prefer, int max)
             if (digits > 9) digits = 9;
             memcpy(number, at + 5, digits);
             number[digits] = '\0';
-            if (query_integer(number, 0, 999999999, &seconds))
+            if (query_whole_number(number, 0, 999999999, &seconds))
                 return seconds > max ? max : (int)seconds;
         }
         at += length;

@@ -22,7 +22,7 @@ enum query_answer query_find(const char *query, const char *key, char *ret, size
 bool query_unknown(const char *query, const char *const *known, char *ret, size_t size);
 
 /* A whole decimal number; false when it is anything else or out of [min, max]. */
-bool query_integer(const char *text, long long min, long long max, long long *ret);
+bool query_whole_number(const char *text, long long min, long long max, long long *ret);
 
 /* Seconds of "wait=N" in a Prefer header (RFC 7240); -1 when there is none. Never above max. */
 int query_prefer_wait(const char *prefer, int max);
