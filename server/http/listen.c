@@ -125,5 +125,10 @@ void listen_peer_text(const struct sockaddr *peer, char *ret, size_t size)
 
 bool listen_text_is_loopback(const char *numeric)
 {
-    return strncmp(numeric, "127.", 4) == 0 || strcmp(numeric, "::1") == 0;
+    enum { LOOPBACK_NET = 127 };
+    struct in_addr v4;
+    struct in6_addr v6;
+    /* Whole addresses only: "127.0.0.1.example" is a name that anybody may own. */
+    if (inet_pton(AF_INET, numeric, &v4) == 1) return ntohl(v4.s_addr) >> 24 == LOOPBACK_NET;
+    return inet_pton(AF_INET6, numeric, &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }

@@ -172,11 +172,11 @@ class Rates(unittest.TestCase):
                 far = {'X_Forwarded_For': '203.0.113.9'}
                 self.assertIn(429, [service.get('/version', **far).status for _ in range(3)])
                 with open(path, 'w', encoding='utf-8') as file:
-                    file.write('behind_proxy = true\nrate_limit = 0\nworkers = 3\n')
+                    file.write('behind_proxy = true\nrate_limit = 0\nconnections = 3000\n')
                 service.signal(signal.SIGHUP)
                 time.sleep(1.5)
                 self.assertEqual([service.get('/version', **far).status for _ in range(5)], [200] * 5)
-                self.assertIn('need_restart="workers"', service.errors())
+                self.assertIn('need_restart="connections"', service.errors())
 
 
 class Doors(unittest.TestCase):
