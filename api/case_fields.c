@@ -94,6 +94,13 @@ const char *case_doc_column_key(const char *column)
     return strcmp(mark + 1, ischia_params[found].unit) == 0 ? case_key_name(found) : NULL;
 }
 
+/* "skin.thick" of "skin.thickness". */
+static bool is_beginning(const char *name, const char *key)
+{
+    const size_t length = strlen(name);
+    return length >= 4 && strncmp(name, key, length) == 0;
+}
+
 const char *case_doc_nearest_key(const char *key)
 {
     char buffer[8];
@@ -102,8 +109,9 @@ const char *case_doc_nearest_key(const char *key)
     for (size_t i = 0; i < sizeof synonyms / sizeof synonyms[0]; i++)
         if (text_distance(name, synonyms[i].word) == 0) return synonyms[i].key;
     for (int i = 0; i < KEY_COUNT; i++) {
+        if (is_beginning(name, case_key_name(i))) return case_key_name(i);
         const int distance = text_distance(name, case_key_name(i));
-        if (distance >= least) continue;
+        if (distance >= least || distance >= (int)strlen(name)) continue;
         least = distance;
         nearest = case_key_name(i);
     }
@@ -128,7 +136,10 @@ bool case_key_first_time(struct case_doc_fields *fields, int key, const char *sp
     const bool first = (fields->seen & bit) == 0;
     fields->seen |= bit;
     if (first) return true;
-    (void)doc_pointer(pointer, sizeof pointer, "", spelling);
+    if (key >= KEY_FIRST_OPTION)
+        (void)key_pointer(key, pointer);
+    else
+        (void)doc_pointer(pointer, sizeof pointer, "", spelling);
     if (!doc_faults_has(fields->faults, pointer))
         doc_faults_add(fields->faults, pointer, "duplicate", "%s is given more than once%s%s",
                        spelling, strcmp(spelling, case_key_name(key)) != 0 ? ", also as " : "",

@@ -46,7 +46,8 @@ ISCHIA_MUST_CHECK enum ischia_code csv_read(struct csv_reader *reader, struct cs
 /* Writing: the fields of a row one after the other, then the end of the line (LF). A field is
  * quoted when it must be. `first` leaves out the comma before it. */
 void csv_put_text(struct text_out *out, const char *utf8, bool first);
-void csv_put_number(struct text_out *out, double value, bool first); /* not finite: an empty field */
+void csv_put_number(struct text_out *out, double value,
+                    bool first); /* not finite: an empty field */
 void csv_put_integer(struct text_out *out, long long value, bool first);
 void csv_end_row(struct text_out *out);
 

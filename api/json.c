@@ -78,7 +78,8 @@ static void check_tree(const cJSON *item, const char *pointer, int members_max,
                        struct doc_faults *faults)
 {
     if (cJSON_IsNumber(item) && !isfinite(item->valuedouble))
-        doc_faults_add(faults, pointer, "not_finite", "%s is beyond the range of numbers (1.8e308)",
+        doc_faults_add(faults, pointer, "not_finite",
+                       "%s is beyond 1.8e308; accepted finite numbers",
                        item->string != NULL ? item->string : "the number");
     if (cJSON_IsObject(item)) check_object(item, pointer, members_max, faults);
     if (cJSON_IsArray(item)) check_array(item, pointer, members_max, faults);

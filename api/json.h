@@ -67,7 +67,7 @@ const struct json *json_next(const struct json *member);
 /* The first member with this key, NULL when there is none or object is not an object. */
 const struct json *json_member(const struct json *object, const char *key);
 
-const char *json_library_version(void); /* of cJSON: "1.7.15" */
+const char *json_library_version(void); /* of cJSON, as it runs: "1.7.15" */
 
 /* ---- writing ---- */
 

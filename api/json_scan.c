@@ -17,7 +17,8 @@ struct scan {
     size_t at;
     int depth;
     int depth_max;
-    const char *expected; /* what the scan wanted to see at `at`, once it has failed */
+    size_t key, key_length; /* the last key of an object, with its quotes; length 0: none  */
+    const char *expected;   /* what the scan wanted to see at `at`, once it has failed     */
 };
 
 static bool wanted(struct scan *s, const char *expected)
@@ -114,7 +115,7 @@ static bool number(struct scan *s)
         end++;
     if (end - s->at > TEXT_NUMBER_LENGTH_MAX) return wanted(s, "a number of at most 60 characters");
     if (!text_to_number(s->text + s->at, end - s->at, &ignored))
-        return wanted(s, "a number such as -1.5e3");
+        return wanted(s, "a number such as -1.5e3 (NaN and Infinity are not JSON)");
     s->at = end;
     return true;
 }
@@ -133,7 +134,10 @@ static bool value(struct scan *s);
 static bool member(struct scan *s)
 {
     skip_space(s);
+    const size_t key = s->at;
     if (!string(s)) return false;
+    s->key = key;
+    s->key_length = s->at - key;
     skip_space(s);
     return take(s, ':') ? value(s) : wanted(s, "a colon");
 }
@@ -196,8 +200,10 @@ static enum ischia_code report(const struct scan *s, struct ischia_error *err)
     const int c = peek(s);
     if (c >= 0)
         (void)snprintf(found, sizeof found, c > 0x20 && c < 0x7F ? "'%c'" : "0x%02X", (unsigned)c);
-    return FAIL(err, ISCHIA_E_INPUT, "not JSON: line %zu, column %zu: expected %s, found %s", line,
-                column, s->expected, found);
+    const int key_length = s->key_length < 40 ? (int)s->key_length : 40;
+    return FAIL(err, ISCHIA_E_INPUT, "not JSON: line %zu, column %zu%s%.*s: expected %s, found %s",
+                line, column, key_length > 0 ? ", at or after " : "", key_length, s->text + s->key,
+                s->expected, found);
 }
 
 enum ischia_code json_scan(const char *text, size_t length, int depth_max, struct ischia_error *err)

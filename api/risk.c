@@ -16,8 +16,8 @@ const struct risk_band_info risk_bands[RISK_BAND_COUNT] = {
 
 const char *const risk_caveats[RISK_CAVEAT_COUNT] = {
     "The damage thresholds come from experiments on animals.",
-    "The local model reads higher than a full model of the same person (RMS difference 0.5 in the "
-    "published comparison): it ranks, it does not diagnose.",
+    ("The local model reads higher than a full model of the same person (RMS difference 0.5 in the "
+     "published comparison): it ranks, it does not diagnose."),
     "This is not a medical device.",
 };
 

@@ -18,5 +18,6 @@ int command_solve(int argc, char **argv);
 int command_cohort(int argc, char **argv);
 int command_check_tangent(int argc, char **argv);
 int command_export(int argc, char **argv);
+int command_version(int argc, char **argv);
 
 #endif
