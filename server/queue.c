@@ -3,6 +3,7 @@
 
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -184,9 +185,9 @@ static void judge_crash(const struct queue *queue, const struct pool_job *job, c
         verdict->crashed = true;
         return;
     }
-    char words[sizeof verdict->detail + 80];
-    (void)stpcpy(stpncpy(words, detail, sizeof verdict->detail),
-                 job->crashes > 0 ? "; so did the worker of the attempt before" : "");
+    char words[sizeof verdict->detail + 120];
+    (void)snprintf(words, sizeof words, "the worker that solved it: %s%s", detail,
+                   job->crashes > 0 ? "; the attempt before ended in the same way or alike" : "");
     fail_with(verdict, PROBLEM_WORKER_DIED, words);
 }
 
@@ -226,7 +227,8 @@ static void on_outcome(void *context, const struct pool_job *job,
                               .to = QUEUE_QUEUED,
                               .end = outcome->end,
                               .wall_ms = outcome->wall_ms};
-    (void)stpncpy(verdict.detail, outcome->detail, sizeof verdict.detail - 1);
+    (void)snprintf(verdict.detail, sizeof verdict.detail, "%.*s", (int)sizeof verdict.detail - 1,
+                   outcome->detail);
     switch (outcome->end) {
     case POOL_RESULT:
     case POOL_PROBLEM:
@@ -282,7 +284,7 @@ static void on_progress(void *context, const struct pool_job *job,
                           .load_step = progress->load_step,
                           .newton_iteration = progress->newton_iteration,
                           .F_N = progress->F_N};
-    (void)stpncpy(event.message, progress->message, sizeof event.message - 1);
+    (void)snprintf(event.message, sizeof event.message, "%s", progress->message);
     events_publish(queue->events, &job->id, &event);
 }
 

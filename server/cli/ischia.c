@@ -22,6 +22,7 @@ static const struct command {
     {"export", command_export, "write the model for CalculiX, ParaView or as a drawing"},
     {"check-tangent", command_check_tangent, "compare derivatives with finite differences"},
     {"version", command_version, "versions of the program, the model and the libraries"},
+    {"worker", command_worker, NULL},
     {"help", command_help, "show this, or the help of a command"},
 };
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };

@@ -79,6 +79,17 @@ static void diverge(const struct ischia_case *c, struct ischia_result *r)
     (void)snprintf(r->numerics.detail, sizeof r->numerics.detail, "the double was told to");
 }
 
+/* One "node" for each input. */
+static enum ischia_code fill_field(const struct ischia_case *c, struct ischia_field *ret_field,
+                                   struct ischia_error *err)
+{
+    double *displacement_mm = calloc(3 * ISCHIA_PARAM_COUNT, sizeof *displacement_mm);
+    CHECK(displacement_mm != NULL, err, ISCHIA_E_MEMORY, "out of memory");
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) displacement_mm[3 * i + 2] = c->param[i] / -100;
+    *ret_field = (struct ischia_field){ISCHIA_PARAM_COUNT, displacement_mm};
+    return ISCHIA_OK;
+}
+
 static bool observe(const struct ischia_observer *observer, const struct ischia_case *c)
 {
     const struct ischia_progress progress = {0.5, 2, 3, c->param[ISCHIA_F] / 2, "halfway"};
@@ -100,8 +111,9 @@ enum ischia_code ischia_solve(struct ischia_solver *solver, const struct ischia_
     CHECK(how != 404 && observe(observer, c), err, ISCHIA_E_CANCELLED, "the solve was cancelled");
     fill(c, ret_result);
     if (how == 401) diverge(c, ret_result);
-    if (ret_field != NULL) *ret_field = (struct ischia_field){0};
-    return ISCHIA_OK;
+    if (ret_field == NULL) return ISCHIA_OK;
+    *ret_field = (struct ischia_field){0};
+    return how == 401 ? ISCHIA_OK : fill_field(c, ret_field, err);
 }
 
 void ischia_field_finish(struct ischia_field *field)
