@@ -197,12 +197,13 @@ static enum ischia_code enter_state_dir(struct daemon *d, struct ischia_error *e
     return ISCHIA_OK;
 }
 
-/* `ischia` beside this program, where a build and a package both put it; else whatever is on the
- * path. */
+/* `ischia` beside this program, where a package puts it, or below it, where a build does; else
+ * whatever is on the path. */
 static void find_worker(struct daemon *d)
 {
+    static const char *const places[] = {"ischia", "cli/ischia"};
     const char *wish = d->service.config.worker_program;
-    char own[PATH_MAX - 16];
+    char own[PATH_MAX - 16], candidate[PATH_MAX];
     (void)snprintf(d->worker_program, sizeof d->worker_program, "%s",
                    wish[0] == '\0' ? "ischia" : wish);
     const ssize_t n = readlink("/proc/self/exe", own, sizeof own - 1);
@@ -211,10 +212,12 @@ static void find_worker(struct daemon *d)
     char *slash = strrchr(own, '/');
     if (slash == NULL) return;
     *slash = '\0';
-    char beside[PATH_MAX];
-    (void)snprintf(beside, sizeof beside, "%s/ischia", own);
-    if (access(beside, X_OK) == 0)
-        (void)snprintf(d->worker_program, sizeof d->worker_program, "%s", beside);
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        (void)snprintf(candidate, sizeof candidate, "%s/%s", own, places[i]);
+        if (access(candidate, X_OK) != 0) continue;
+        (void)snprintf(d->worker_program, sizeof d->worker_program, "%s", candidate);
+        return;
+    }
 }
 
 static enum ischia_code open_store(struct daemon *d, struct ischia_error *err)
