@@ -104,63 +104,6 @@ int64_t http_now_ms(void)
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
-/* ------------------------------------------------------------------------- responses */
-
-void http_response_init(struct http_response *ret, int status)
-{
-    memset(ret, 0, offsetof(struct http_response, header));
-    ret->action = HTTP_SEND;
-    ret->status = status;
-    ret->bytes = "";
-    ret->header_count = 0;
-    ret->arena_used = 0;
-}
-
-void http_response_finish(struct http_response *response)
-{
-    if (response->release != NULL) response->release(response->owner);
-    response->release = NULL;
-    if (response->action == HTTP_STREAM) response->stream.close(response->stream.state);
-    response->action = HTTP_SEND;
-}
-
-void http_header_static(struct http_response *response, const char *name, const char *value)
-{
-    if (response->header_count == HTTP_HEADERS_MAX) return;
-    response->header[response->header_count].name = name;
-    response->header[response->header_count].value = value;
-    response->header_count++;
-}
-
-void http_header(struct http_response *response, const char *name, const char *format, ...)
-{
-    char *value = response->arena + response->arena_used;
-    const size_t room = sizeof response->arena - response->arena_used;
-    va_list arguments;
-    va_start(arguments, format);
-    const int n = vsnprintf(value, room, format, arguments);
-    va_end(arguments);
-    if (n < 0 || (size_t)n >= room) return;
-    response->arena_used += (size_t)n + 1;
-    http_header_static(response, name, value);
-}
-
-void http_body(struct http_response *response, const char *type, char *bytes, size_t size)
-{
-    http_body_static(response, type, bytes, size);
-    response->release = free;
-    response->owner = bytes;
-    response->compressible = true;
-}
-
-void http_body_static(struct http_response *response, const char *type, const char *bytes,
-                      size_t size)
-{
-    response->type = type;
-    response->bytes = bytes;
-    response->size = size;
-}
-
 const char *http_request_header(const struct http_request *request, const char *name)
 {
     return MHD_lookup_connection_value(request->exchange->mhd, MHD_HEADER_KIND, name);
@@ -249,7 +192,7 @@ static int64_t resume_due(struct http_server *server, int64_t now_ms)
 /* ---------------------------------------------------------------------- slow clients */
 
 /* Answers past the library, which cannot answer in the middle of a request. It has sent nothing for
- * this request, so the bytes are the first. Over TLS the library alone can write: no words there. */
+ * this request, so the bytes are the first. Over TLS only the library can write: no words there. */
 static void refuse_on_socket(struct http_server *server, const struct connection *connection,
                              int status, const char *detail)
 {
