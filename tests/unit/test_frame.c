@@ -213,8 +213,8 @@ static void test_bad_messages_are_refused(void **state)
         "{\"op\":\"result\",\"job\":1}",
         "{\"op\":\"solve\",\"job\":1}",
         "{\"op\":\"solve\",\"job\":1,\"case\":[]}",
-        "{\"say\":\"progress\",\"job\":1,\"fraction\":1.01,\"load_step\":1,"
-        "\"newton_iteration\":1,\"F_N\":1,\"message\":\"\"}",
+        ("{\"say\":\"progress\",\"job\":1,\"fraction\":1.01,\"load_step\":1,"
+         "\"newton_iteration\":1,\"F_N\":1,\"message\":\"\"}"),
         "{\"say\":1}",
         "[1]",
         "{\"say\":\"result\",\"job\":1}x",
