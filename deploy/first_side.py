@@ -67,7 +67,7 @@ def main():
         document = ask(address, document['links']['self'])
     status = show(document)
     print(
-        f'\nThe form:     {address}/\nThis side:    {address}{document["links"]["self"]}\n'
+        f'\nThe form:     {address}/\nThis side:    {address}{document["links"]["self"]}/report\n'
         f'For programs: {address}/docs\nCtrl-C ends the service; its data stay in ./data.',
         flush=True,
     )
