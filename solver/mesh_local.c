@@ -150,7 +150,7 @@ static void bowl_point(const struct local_geometry *g, double v, double q, doubl
 }
 
 /* The three patches of the quarter disc. Coordinates (a, b) in [0, 1]^2: in the core a is along x
- * and b along y; in the other two a is along the core's edge from its axis, b outward to the rim. */
+ * and b along y; in the others a is along the core's edge from its axis, b outward to the rim. */
 enum patch { PATCH_CORE, PATCH_X, PATCH_Y };
 
 static void core_disc_point(double a, double b, double ret[2])

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Stiffness of the sticking springs per unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
+/* Stiffness of the sticking springs by unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
 static const double stick_stiffness_MPa_mm = 0.25;
 
 /* The outer skin starts resting on the seat: pressed by a force too small to matter, but not zero. */

@@ -29,6 +29,7 @@ struct seat {
     int node_count;
 };
 
+/* Nothing pressed, anchors where the unloaded nodes are. ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code seat_init(struct seat *ret, const struct mesh *mesh,
                                              double friction, struct ischia_error *err);
 void seat_finish(struct seat *seat);

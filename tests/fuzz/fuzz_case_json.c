@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
  * Any bytes as a case in JSON: no crash; what the scan has passed, cJSON takes (the only other
- * error would be memory, which is there); a case without faults is valid and survives being written.
+ * error would be memory, which is there); a case without faults is valid and survives being
+ * written.
  */
 #include "tests/fuzz/fuzz.h"
 
