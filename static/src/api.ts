@@ -25,18 +25,20 @@ async function problem_of(response: Response): Promise<Problem> {
   }
 }
 
-async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
+async function ask(path: string, accept: string, init: RequestInit = {}): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(path, {
-      ...init,
-      headers: { Accept: 'application/json', ...(init.headers as Record<string, string>) },
-    });
+    const headers = { Accept: accept, ...(init.headers as Record<string, string>) };
+    response = await fetch(path, { ...init, headers });
   } catch {
     throw new ApiError(0, {});
   }
   if (!response.ok) throw new ApiError(response.status, await problem_of(response));
-  return (await response.json()) as T;
+  return response;
+}
+
+async function request<T>(path: string, init?: RequestInit): Promise<T> {
+  return (await (await ask(path, 'application/json', init)).json()) as T;
 }
 
 const assessment_path = (id: string): string => `/v1/assessments/${encodeURIComponent(id)}`;
@@ -106,11 +108,20 @@ export interface Filter {
   limit?: number;
 }
 
-export async function list(filter: Filter): Promise<Page> {
+function list_path(filter: Filter): string {
   const query = new URLSearchParams();
   for (const [key, value] of Object.entries(filter)) if (value) query.set(key, String(value));
+  return `/v1/assessments?${query}`;
+}
+
+export async function list(filter: Filter): Promise<Page> {
   const page = await request<{ items: Assessment[]; next_cursor?: string | null }>(
-    `/v1/assessments?${query}`,
+    list_path(filter),
   );
   return { items: page.items, next_cursor: page.next_cursor ?? null };
+}
+
+/* The same list as a table for a spreadsheet, up to the daemon's largest page. */
+export async function list_as_csv(filter: Filter): Promise<Blob> {
+  return (await ask(list_path({ ...filter, limit: 500 }), 'text/csv')).blob();
 }

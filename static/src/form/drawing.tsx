@@ -14,8 +14,8 @@ export interface Geometry {
 }
 
 /* The frame that the studied sizes need; larger tissue shrinks the scale, and the bar with it. */
-const frame_mm = { half_width: 66, height: 84 };
-const px = { width: 300, height: 236, bottom: 24 };
+const frame_mm = { half_width: 48, height: 92 };
+const px = { width: 300, height: 330, bottom: 24 };
 
 /* Below this the picture would be a blot rather than a warning. */
 const drawable = (g: Geometry): boolean =>
@@ -28,24 +28,28 @@ interface Scale {
 }
 
 function scale_for(g: Geometry): Scale {
-  const height = Math.max(frame_mm.height, (g.skin + g.eF + g.eM + g.R1) * 1.04);
+  const height = Math.max(frame_mm.height, (g.skin + g.eF + g.eM + 2 * g.R1) * 1.04);
   const half = Math.max(frame_mm.half_width, g.R1 * 1.2);
   const k = Math.min((px.height - px.bottom) / height, px.width / 2 / half);
   return { k, x: (mm) => px.width / 2 + mm * k, y: (mm) => px.height - px.bottom - mm * k };
 }
 
-/* Half outline of the bone below the top of the tissue, from the tip outwards and up. `radius` is
- * that of the surface in this plane; `sign` the side of the axis. */
-function bone_path(s: Scale, tip: number, radius: number, top: number, sign: 1 | -1): string {
-  const rise = Math.min(top - tip, radius);
-  const reach = Math.sqrt(Math.max(0, radius * radius - (radius - rise) ** 2));
-  const r = radius * s.k;
-  const sweep = sign > 0 ? 0 : 1;
+/* Half of the bone across: the tube of radius R1 that lies on the muscle. */
+function tube_path(s: Scale, tip: number, R1: number): string {
+  const r = R1 * s.k;
+  return `M${s.x(0)} ${s.y(tip)}A${r} ${r} 0 0 1 ${s.x(0)} ${s.y(tip + 2 * R1)}Z`;
+}
+
+/* Half of the bone along: the same tube bent to a ring whose centre line has the radius R2. */
+function ring_path(s: Scale, tip: number, g: Geometry): string {
+  const outer = (g.R2 + g.R1) * s.k;
+  const inner = Math.max(0, g.R2 - g.R1) * s.k;
+  const [x, bottom] = [s.x(0), s.y(tip)];
+  const top = bottom - 2 * outer;
+  const thick = outer - inner;
   return [
-    `M${s.x(0)} ${s.y(tip)}`,
-    `A${r} ${r} 0 0 ${sweep} ${s.x(sign * reach)} ${s.y(tip + rise)}`,
-    `L${s.x(sign * reach)} ${s.y(top)}`,
-    `L${s.x(0)} ${s.y(top)}Z`,
+    `M${x} ${bottom}A${outer} ${outer} 0 0 0 ${x} ${top}`,
+    `L${x} ${top + thick}A${inner} ${inner} 0 0 1 ${x} ${bottom - thick}Z`,
   ].join('');
 }
 
@@ -77,6 +81,16 @@ function Dimension(props: { s: Scale; from: number; to: number; at: number; text
   );
 }
 
+/* What one half shows, on a ground of its own: a large ring may pass under it. */
+function Heading(props: { x: number; text: string; size: string }) {
+  return (
+    <text class="half end" x={props.x} y="14">
+      {props.text}
+      <tspan x={props.x} dy="13">{props.size}</tspan>
+    </text>
+  );
+}
+
 function Labels(props: { s: Scale; g: Geometry; tip: number; top: number }) {
   const { s, g, tip, top } = props;
   const interface_z = g.skin + g.eF;
@@ -86,29 +100,17 @@ function Labels(props: { s: Scale; g: Geometry; tip: number; top: number }) {
     <>
       <Dimension s={s} from={interface_z} to={tip} at={12} text={`eM ${format(g.eM)}`} />
       <Dimension s={s} from={g.skin} to={interface_z} at={12} text={`eF ${format(g.eF)}`} />
-      <text class="half" x="8" y="12">
-        {t('drawing.across')}
-      </text>
-      <text class="half end" x={px.width - 8} y="12">
-        {t('drawing.along')}
-      </text>
+      <Heading x={px.width / 2 - 8} text={t('drawing.across')} size={`R1 ${format(g.R1)}`} />
+      <Heading x={px.width - 8} text={t('drawing.along')} size={`R2 ${format(g.R2)}`} />
       <text class="end" x={px.width - 8} y={Math.max(s.y((interface_z + tip) / 2) + 4, s.y(top) + 14)}>
         {t('drawing.muscle')}
       </text>
       <text class="end" x={px.width - 8} y={s.y((g.skin + interface_z) / 2) + 4}>
         {t('drawing.fat')}
       </text>
-      <text class="on_bone end" x={px.width / 2 - 5} y={s.y(top) - 5}>
-        {`R1 ${format(g.R1)}`}
-      </text>
-      <text class="on_bone" x={px.width / 2 + 5} y={s.y(top) - 5}>
-        {`R2 ${format(g.R2)}`}
-      </text>
       <path class="bar" d={`M${px.width - 8} ${y_seat + 11}v6h${-bar * s.k}v-6`} />
       <text class="end" x={px.width - 14 - bar * s.k} y={y_seat + 18}>{`${bar} mm`}</text>
-      <text x="8" y={y_seat + 18}>
-        {t('drawing.seat')}
-      </text>
+      <text x="8" y={y_seat + 18}>{t('drawing.seat')}</text>
     </>
   );
 }
@@ -123,9 +125,9 @@ function Picture(props: { g: Geometry }) {
       <Layer s={s} from={g.skin + g.eF} to={top} name="muscle" />
       <Layer s={s} from={g.skin} to={g.skin + g.eF} name="fat" />
       <Layer s={s} from={0} to={g.skin} name="skin" />
-      <path class="bone" d={bone_path(s, tip, g.R1, top, -1)} />
-      <path class="bone" d={bone_path(s, tip, g.R2 + g.R1, top, 1)} />
-      <path class="axis" d={`M${s.x(0)} ${s.y(top)}V${s.y(0)}`} />
+      <path class="bone" d={tube_path(s, tip, g.R1)} />
+      <path class="bone" d={ring_path(s, tip, g)} />
+      <path class="axis" d={`M${s.x(0)} 0V${s.y(0)}`} />
       <rect class="seat" x="0" width={px.width} y={s.y(0)} height="4" />
       <Labels s={s} g={g} tip={tip} top={top} />
     </>

@@ -119,7 +119,6 @@ export function Field(props: FieldProps) {
         />
         <span class="unit">{unit}</span>
       </span>
-      {props.toggle}
       <span class="notes">
         <span id={`${id}-range`} class="range">
           {t('form.accepted', { min: accepted.min, max: accepted.max, unit })}
@@ -127,6 +126,7 @@ export function Field(props: FieldProps) {
             {` · ${t('form.studied', { min: studied.min, max: studied.max })}`}
           </span>
         </span>
+        {props.toggle}
         <Reading {...props} id={`${id}-reading`} />
       </span>
     </div>

@@ -2,7 +2,7 @@
 //
 // What the form knows, apart from how it looks: the texts as typed, what they mean, what is wrong
 // with them, and the documents to send. Limits come from the daemon, never from here.
-import { format, t } from '../i18n.js';
+import { t } from '../i18n.js';
 import { difference, parse_number, type Parsed } from '../number.js';
 import type { Submission } from '../api.js';
 import type { FieldError, ParameterInfo, Side } from '../types.js';
@@ -72,8 +72,7 @@ export function finding(
   const p = parsed(entry, info.key);
   if (p.kind === 'empty') return null;
   if (p.kind === 'ambiguous') {
-    const example = `${format(1234.5).replace(/\s/g, '')}`;
-    return { severity: 'fault', code: 'ambiguous', text: t('fault.ambiguous', { example }) };
+    return { severity: 'fault', code: 'ambiguous', text: t('fault.ambiguous') };
   }
   if (p.kind === 'not_a_number') {
     return { severity: 'fault', code: 'not_a_number', text: t('fault.not_a_number') };

@@ -20,7 +20,7 @@ function Sample(props: { on_sample: (sample: SamplePerson) => void }) {
       <select id="sample" value={chosen} onChange={(e) => choose(Number(e.currentTarget.value))}>
         {sample_persons.map((p, i) => (
           <option key={p.subject} value={i}>
-            {t('form.sample.option', { n: p.subject.replace(/^\D*\d*-/, '') })}
+            {t('form.sample.option', { n: p.number })}
           </option>
         ))}
       </select>
@@ -69,17 +69,6 @@ export function PersonFields(props: {
           value={person.measured_at}
           onInput={(e) => on_change({ ...person, measured_at: e.currentTarget.value })}
         />
-      </div>
-      <div class="item">
-        <label for="resolution">{t('form.resolution')}</label>
-        <select
-          id="resolution"
-          value={person.resolution}
-          onChange={(e) => on_change({ ...person, resolution: e.currentTarget.value })}
-        >
-          <option value="standard">{t('form.resolution.standard')}</option>
-          <option value="fine">{t('form.resolution.fine')}</option>
-        </select>
       </div>
       <Sample on_sample={props.on_sample} />
     </fieldset>

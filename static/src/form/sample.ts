@@ -5,7 +5,8 @@ import csv from 'table2:inputs';
 import type { Side } from '../types.js';
 
 export interface SamplePerson {
-  subject: string;
+  subject: string; /* as sent: table2-1 */
+  number: string; /* as in the table: 1 */
   sides: Partial<Record<Side, Record<string, string>>>;
 }
 
@@ -25,7 +26,11 @@ function read(text: string): SamplePerson[] {
   const persons = new Map<string, SamplePerson>();
   for (const { subject = '', side, ...numbers } of rows(text)) {
     if (side !== 'left' && side !== 'right') continue;
-    const person = persons.get(subject) ?? { subject, sides: {} };
+    const person = persons.get(subject) ?? {
+      subject,
+      number: subject.replace(/^.*-/, ''),
+      sides: {},
+    };
     person.sides[side] = numbers;
     persons.set(subject, person);
   }

@@ -3,35 +3,40 @@
 // Past assessments: filtered, newest first, two of them selectable for comparison. The filter
 // stands in the address, so a list can be kept as a bookmark.
 import { useEffect, useState } from 'preact/hooks';
-import { ApiError, list, type Page } from '../api.js';
+import { ApiError, list, list_as_csv, type Filter, type Page } from '../api.js';
 import { format, format_fixed, format_time, t } from '../i18n.js';
 import { list_address, navigate, result_address } from '../router.js';
 import type { Assessment } from '../types.js';
-import { Link, Outcome, side_name } from '../ui.js';
+import { Link, Outcome, save_file, side_name } from '../ui.js';
 
 const page_size = 50;
 const inputs = ['R1', 'R2', 'eM', 'eF', 'muM', 'muF', 'F'];
 const statuses = ['queued', 'running', 'succeeded', 'failed', 'cancelled'] as const;
 
-function use_page(query: URLSearchParams): [Page | null, string | null] {
+function filter_of(query: URLSearchParams): Filter {
+  const value = (key: string): string => query.get(key) ?? '';
+  return { subject: value('subject'), side: value('side'), status: value('status') };
+}
+
+function fault_text(e: unknown): string {
+  if (!(e instanceof ApiError)) throw e;
+  return e.status === 0 ? t('form.error.unreachable') : t('list.error', { detail: e.message });
+}
+
+type UsedPage = [Page | null, string | null, (e: unknown) => void];
+
+function use_page(query: URLSearchParams): UsedPage {
   const [page, set_page] = useState<Page | null>(null);
   const [fault, set_fault] = useState<string | null>(null);
   useEffect(() => {
     set_page(null);
     set_fault(null);
-    const value = (key: string): string => query.get(key) ?? '';
-    list({
-      subject: value('subject'),
-      side: value('side'),
-      status: value('status'),
-      cursor: value('cursor'),
-      limit: page_size,
-    }).then(set_page, (e: unknown) => {
-      if (!(e instanceof ApiError)) throw e;
-      set_fault(e.status === 0 ? t('form.error.unreachable') : t('list.error', { detail: e.message }));
-    });
+    list({ ...filter_of(query), cursor: query.get('cursor') ?? '', limit: page_size }).then(
+      set_page,
+      (e: unknown) => set_fault(fault_text(e)),
+    );
   }, [query.toString()]);
-  return [page, fault];
+  return [page, fault, (e) => set_fault(fault_text(e))];
 }
 
 function address(query: URLSearchParams): string {
@@ -84,7 +89,7 @@ function Row(props: { of: Assessment; selected: boolean; full: boolean; on_selec
       <td class="text">
         <input type="checkbox" checked={selected} disabled={full && !selected} aria-label={name} onChange={props.on_select} />
       </td>
-      <th scope="row"><Link to={result_address([of.id])}>{time}</Link></th>
+      <th scope="row" class="text"><Link to={result_address([of.id])}>{time}</Link></th>
       <td class="text">{of.subject ?? '–'}</td>
       <td class="text">{side_name(of.side)}</td>
       <td class="text"><Outcome of={of} /></td>
@@ -103,7 +108,7 @@ function Rows(props: { items: Assessment[]; selected: string[]; on_select: (id: 
         <thead>
           <tr>
             <th scope="col" class="text">{t('list.col.select')}</th>
-            <th scope="col">{t('list.col.time')}</th>
+            <th scope="col" class="text">{t('list.col.time')}</th>
             <th scope="col" class="text">{t('list.col.subject')}</th>
             <th scope="col" class="text">{t('list.col.side')}</th>
             <th scope="col" class="text">{t('list.col.outcome')}</th>
@@ -143,10 +148,13 @@ function Pager(props: { query: URLSearchParams; page: Page }) {
 }
 
 export function ListPage(props: { query: URLSearchParams }) {
-  const [page, fault] = use_page(props.query);
+  const [page, fault, fail] = use_page(props.query);
   const [selected, set_selected] = useState<string[]>([]);
   const toggle = (id: string): void =>
     set_selected((now) => (now.includes(id) ? now.filter((s) => s !== id) : [...now, id].slice(0, 2)));
+  const save_csv = (): void => {
+    list_as_csv(filter_of(props.query)).then((blob) => save_file(blob, 'assessments.csv'), fail);
+  };
   const compare = (): void => {
     if (selected.length === 2) navigate(result_address(selected));
   };
@@ -155,6 +163,7 @@ export function ListPage(props: { query: URLSearchParams }) {
       <h1 tabIndex={-1}>{t('list.title')}</h1>
       <div class="list-bar">
         <FilterForm query={props.query} />
+        <button type="button" onClick={save_csv}>{t('list.csv')}</button>
         <div class="compare">
           <button type="button" class="primary" aria-disabled={selected.length !== 2} onClick={compare}>
             {t('list.compare')}

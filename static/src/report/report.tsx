@@ -36,7 +36,7 @@ function Strain(props: { of: Finished }) {
   const rows: [string, string, string, string][] = [
     ['ε max', t('report.engineering'),
       `${format_fixed(strain.eps_max, 3)} ± ${format_fixed(numerics.eps_max_error, 3)}`,
-      t('glance.axis.depth', { depth })],
+      t('report.depth', { depth })],
     ['E shear', t('report.green_lagrange'), format_fixed(strain.E_shear_max, 3), threshold(clusters.shear)],
     ['E comp', t('report.green_lagrange'), format_fixed(strain.E_comp_max, 3), threshold(clusters.compression)],
     [t('numbers.travel'), '', `${format_fixed(seat.displacement_mm, 1)} mm`, ''],
@@ -48,8 +48,8 @@ function Strain(props: { of: Finished }) {
       <tbody>
         {rows.map(([name, measure, value, note]) => (
           <tr key={name}>
-            <th scope="row">{name}</th>
-            <td>{measure}</td>
+            <th scope="row" colSpan={measure ? 1 : 2}>{name}</th>
+            {measure && <td>{measure}</td>}
             <td class="n">{value}</td>
             <td>{note}</td>
           </tr>

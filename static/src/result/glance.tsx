@@ -34,7 +34,7 @@ function Where(props: { set: ClusterSet; tip: number }) {
   const { set, tip } = props;
   if (!set.largest) return null;
   const depth = format_fixed(tip - set.largest.centroid_mm[2], 1);
-  return <>{`${bodies(set)}, ${t('glance.where', { depth })}`}</>;
+  return <span class="more">{`${bodies(set)}, ${t('glance.where', { depth })}`}</span>;
 }
 
 export function Glance(props: { of: Finished; skin_mm: number }) {
@@ -56,6 +56,7 @@ export function Glance(props: { of: Finished; skin_mm: number }) {
           <span class="more">
             <Force from={force.shear} F={F} />
           </span>
+          {band !== 'both' && <Where set={clusters.shear} tip={tip} />}
         </dd>
         <dt>{t('glance.compression', { threshold: clusters.compression.threshold ?? '' })}</dt>
         <dd>
@@ -63,13 +64,12 @@ export function Glance(props: { of: Finished; skin_mm: number }) {
           <span class="more">
             <Force from={force.compression} F={F} />
           </span>
+          {band !== 'both' && <Where set={clusters.compression} tip={tip} />}
         </dd>
         <dt>{t('glance.both')}</dt>
         <dd>
           <Volume set={clusters.both} result={result} />
-          <span class="more">
-            <Where set={clusters.both} tip={tip} />
-          </span>
+          <Where set={clusters.both} tip={tip} />
         </dd>
         <dt>{t('glance.axis')}</dt>
         <dd>

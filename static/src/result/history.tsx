@@ -3,6 +3,7 @@
 // Other assessments of the same subject, over time: a small chart and the same in a table.
 import { useEffect, useState } from 'preact/hooks';
 import { list } from '../api.js';
+import { has_ended } from '../follow.js';
 import { format_fixed, format_time, t } from '../i18n.js';
 import { result_address } from '../router.js';
 import type { Assessment } from '../types.js';
@@ -13,11 +14,11 @@ import { finished, type Finished } from './quantities.js';
 const size = { width: 460, height: 120, left: 36, right: 20, top: 12, foot: 22 };
 const time_of = (d: Assessment): string => d.measured_at ?? d.created_at;
 
-function use_history(subject: string | null): Assessment[] | null {
+/* Read again whenever one more of the assessments shown has ended. */
+function use_history(subject: string | null, ended: number): Assessment[] | null {
   const [items, set] = useState<Assessment[] | null>(null);
   useEffect(() => {
-    set(null);
-    if (!subject) return;
+    if (!subject) return set(null);
     let wanted = true;
     list({ subject, limit: 100 }).then(
       (page) => wanted && set(page.items),
@@ -26,7 +27,7 @@ function use_history(subject: string | null): Assessment[] | null {
     return () => {
       wanted = false;
     };
-  }, [subject]);
+  }, [subject, ended]);
   return items;
 }
 
@@ -95,7 +96,7 @@ export function History(props: { documents: Assessment[] }) {
   const [first, second] = props.documents;
   const subject =
     first?.subject && (!second || second.subject === first.subject) ? first.subject : null;
-  const items = use_history(subject);
+  const items = use_history(subject, props.documents.filter(has_ended).length);
   if (!subject || !items) return null;
   const current = props.documents.map((d) => d.id);
   const others = items.filter((d) => !current.includes(d.id));

@@ -7,8 +7,8 @@ import type { LoadPoint, Result } from '../types.js';
 import { ticks } from './axis.js';
 import type { Finished } from './quantities.js';
 
-const width = 420;
-const plot = { left: 40, right: 12, height: 82, gap: 30, top: 18, foot: 34 };
+const width = 340;
+const plot = { left: 32, right: 8, height: 78, gap: 30, top: 18, foot: 34 };
 
 interface Panel {
   name: string;
@@ -32,12 +32,13 @@ const panel_top = (i: number): number => plot.top + i * (plot.height + plot.gap)
 
 function PanelPlot(props: { panel: Panel; points: LoadPoint[]; index: number; x: (F: number) => number }) {
   const { panel, points, index, x } = props;
-  const max = Math.max(panel.threshold * 1.15, ...points.map(panel.of)) * 1.05;
+  const max = Math.max(panel.threshold * 1.2, ...points.map(panel.of)) * 1.05;
   const top = panel_top(index);
   const bottom = top + plot.height;
   const y = (v: number): number => bottom - (v / max) * plot.height;
   const line = points.map((p, i) => `${i ? 'L' : 'M'}${x(p.F_N)} ${y(panel.of(p))}`).join('');
   const y_threshold = y(panel.threshold);
+  const latest = 0.8 * (points[points.length - 1]?.F_N ?? 0); /* a label after it would not fit */
   return (
     <g class={`panel ${panel.class}`}>
       <text class="name" x={plot.left} y={top - 6}>{panel.name}</text>
@@ -48,7 +49,7 @@ function PanelPlot(props: { panel: Panel; points: LoadPoint[]; index: number; x:
         </g>
       ))}
       <path class="threshold" d={`M${plot.left} ${y_threshold}H${width - plot.right}`} />
-      <text class="threshold" x={width - plot.right} y={y_threshold + 12} text-anchor="end">
+      <text class="threshold" x={plot.left + 4} y={y_threshold - 4}>
         {t('curve.threshold', { value: panel.threshold })}
       </text>
       <path class="line" d={line} />
@@ -56,7 +57,11 @@ function PanelPlot(props: { panel: Panel; points: LoadPoint[]; index: number; x:
         <g class="crossed">
           <path d={`M${x(panel.crossed)} ${y_threshold}V${bottom}`} />
           <circle cx={x(panel.crossed)} cy={y_threshold} r="4" />
-          <text x={x(panel.crossed) + 6} y={bottom - 5}>
+          <text
+            x={x(panel.crossed) + (panel.crossed > latest ? -6 : 6)}
+            y={bottom - 5}
+            text-anchor={panel.crossed > latest ? 'end' : 'start'}
+          >
             {t('curve.crossed', { force: format_fixed(panel.crossed, 0) })}
           </text>
         </g>

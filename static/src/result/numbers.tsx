@@ -9,6 +9,9 @@ import { quantities, quantity_name, type Finished, type Quantity } from './quant
 
 const unit_suffix = (unit: string): string => (unit ? `\u00a0${unit}` : '');
 
+/* Decimals of a number as it was entered. */
+const decimals_of = (value: number | undefined): number => String(value ?? '').split('.')[1]?.length ?? 0;
+
 function difference_text(a: number | null | undefined, b: number | null | undefined, decimals: number): string {
   return typeof a === 'number' && typeof b === 'number' ? format_signed(b - a, decimals) : '–';
 }
@@ -25,7 +28,7 @@ function InputRows(props: { documents: Assessment[]; inputs: ParameterInfo[] }) 
             {values.map((v, i) => (
               <td key={i}>{v === undefined ? '–' : format(v) + unit_suffix(info.unit)}</td>
             ))}
-            {documents.length === 2 && <td class="difference">{difference_text(values[0], values[1], 2)}</td>}
+            {documents.length === 2 && <td class="difference">{difference_text(values[0], values[1], Math.max(...values.map(decimals_of)))}</td>}
           </tr>
         );
       })}

@@ -165,14 +165,14 @@ export function ResultPage(props: { ids: string[] }) {
           />
         ))}
       </div>
-      {done.length > 0 && (
-        <>
-          <Caveats documents={done} inputs={inputs} />
+      {done.length > 0 && <Caveats documents={done} inputs={inputs} />}
+      <div class="lower">
+        {done.length > 0 && <Numbers documents={done} inputs={inputs} />}
+        <div>
           <Strips documents={done} />
-          <Numbers documents={done} inputs={inputs} />
-        </>
-      )}
-      {complete && <History documents={documents} />}
+          {complete && <History documents={documents} />}
+        </div>
+      </div>
       {parameters && <Reports documents={done} parameters={parameters} />}
     </div>
   );

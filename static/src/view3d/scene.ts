@@ -31,7 +31,7 @@ const colours: Record<'muscle' | 'fat' | 'skin' | 'cluster' | 'bone' | 'seat', R
   skin: [0.75, 0.58, 0.45],
   cluster: [0.55, 0.1, 0.1],
   bone: [0.93, 0.9, 0.83],
-  seat: [0.45, 0.5, 0.55],
+  seat: [0.74, 0.78, 0.82],
 };
 const bone_rise_mm = 6; /* how far the bone is shown above the top of the tissue */
 const seat_margin_mm = 12;
@@ -51,8 +51,8 @@ function make_body(colour: Rgb): Body {
   const property = actor.getProperty();
   property.setColor(...colour);
   property.setInterpolationToFlat();
-  property.setAmbient(0.25);
-  property.setDiffuse(0.8);
+  property.setAmbient(0.35);
+  property.setDiffuse(0.7);
   return { actor, mapper, data };
 }
 
@@ -159,10 +159,10 @@ class Tissues implements Scene {
   reset_view(): void {
     const camera = this.window.getRenderer().getActiveCamera();
     camera.setFocalPoint(0, 0, 0);
-    camera.setPosition(1, -1.25, 0.75);
+    camera.setPosition(1, -1.25, 0.6);
     camera.setViewUp(0, 0, 1);
     this.window.getRenderer().resetCamera();
-    camera.zoom(1.25);
+    camera.zoom(1.35);
     this.render();
   }
 

@@ -6,6 +6,7 @@ import { field_path, section_path } from '../api.js';
 import { format, format_fixed, t } from '../i18n.js';
 import type { Finished } from '../result/quantities.js';
 import type { LoadPoint } from '../types.js';
+import { save_file } from '../ui.js';
 import { colour_stops, css_colour } from './colours.js';
 import type { Scene, SceneModule, SceneState } from './contract.js';
 
@@ -157,13 +158,7 @@ function LoadSlider(props: { of: Finished; step: number; change: (step: number) 
 }
 
 function save(scene: Scene, id: string): void {
-  void scene.picture().then((blob) => {
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(blob);
-    link.download = `ischia-${id}.png`;
-    link.click();
-    URL.revokeObjectURL(link.href);
-  });
+  void scene.picture().then((blob) => save_file(blob, `ischia-${id}.png`));
 }
 
 const keys: Record<string, (scene: Scene) => void> = {
