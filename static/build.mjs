@@ -4,7 +4,7 @@
 // its own that is fetched only when somebody opens the 3-D view, assets/view3d.js. The names carry
 // no hash: the daemon serves them with an ETag, so a browser asks once and keeps what it has.
 import { build } from 'esbuild';
-import { cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
+import { cp, mkdir, readdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
@@ -39,7 +39,8 @@ const common = {
   target: ['es2022', 'chrome109', 'firefox115', 'safari16.4'],
   jsx: 'automatic',
   jsxImportSource: 'preact',
-  legalComments: 'linked',
+  legalComments: 'none', /* licences.txt has them whole */
+  metafile: true,
   logLevel: 'warning',
   plugins: [table2],
 };
@@ -51,12 +52,31 @@ async function first_page_bytes() {
   return sizes.reduce((a, b) => a + b, 0);
 }
 
+/* The licence texts of the packages that ended up in a bundle: their terms ask for that. */
+async function write_licences(metafiles) {
+  const inputs = metafiles.flatMap((m) => Object.keys(m.inputs));
+  const names = new Set(inputs.flatMap((path) => /node_modules\/((?:@[^/]+\/)?[^/]+)/.exec(path)?.[1] ?? []));
+  const texts = [];
+  for (const name of [...names].sort()) {
+    const folder = join(here, 'node_modules', name);
+    const { version, license } = JSON.parse(await readFile(join(folder, 'package.json'), 'utf8'));
+    const file = (await readdir(folder)).find((f) => /^licen[cs]e/i.test(f));
+    const text = file ? await readFile(join(folder, file), 'utf8') : `Licence: ${license}\n`;
+    texts.push(`${name} ${version} (${license})\n\n${text.trim()}\n`);
+  }
+  await writeFile(join(dist, 'assets/licences.txt'), texts.join(`\n${'-'.repeat(78)}\n\n`));
+}
+
+const bundle = async (entry, out) =>
+  (await build({ ...common, entryPoints: [join(here, entry)], outfile: join(dist, out) })).metafile;
+
 await rm(dist, { recursive: true, force: true });
 await mkdir(join(dist, 'assets'), { recursive: true });
-await build({ ...common, entryPoints: [join(here, 'src/main.tsx')], outfile: join(dist, 'assets/app.js'),
-  external: ['/assets/*'] });
-await build({ ...common, entryPoints: [join(here, 'src/style/app.css')], outfile: join(dist, 'assets/app.css') });
-await build({ ...common, entryPoints: [join(here, 'src/view3d/scene.ts')], outfile: join(dist, 'assets/view3d.js') });
+await write_licences([
+  await bundle('src/main.tsx', 'assets/app.js'),
+  await bundle('src/style/app.css', 'assets/app.css'),
+  await bundle('src/view3d/scene.ts', 'assets/view3d.js'),
+]);
 await cp(join(here, 'public/icon.svg'), join(dist, 'assets/icon.svg'));
 await writeFile(join(dist, 'index.html'), await readFile(join(here, 'index.html')));
 

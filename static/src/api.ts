@@ -71,6 +71,11 @@ export async function get_parameters(): Promise<Parameters> {
   };
 }
 
+/* The version of the program that answers. */
+export async function get_version(): Promise<string> {
+  return (await request<{ version: string }>('/version')).version;
+}
+
 /* 128 random bits; crypto.randomUUID() does not exist on plain http, which clinics do use. */
 export function new_idempotency_key(): string {
   const bytes = crypto.getRandomValues(new Uint8Array(16));

@@ -36,6 +36,9 @@ function initial(): Language {
 
 let current: Language = initial();
 
+/* The reader's own way of writing dates and numbers where the browser knows one: en-GB for en. */
+const locale = (): string => navigator.languages.find((l) => l.startsWith(current)) ?? current;
+
 export const language = (): Language => current;
 
 export function set_language(next: Language): void {
@@ -66,14 +69,14 @@ export function t_or(key: string, otherwise: string): string {
 /* Up to `digits` significant digits, without a thousands separator that could be misread: a group
  * is set apart with a narrow space. */
 export function format(value: number, digits = 6): string {
-  return new Intl.NumberFormat(current, { maximumSignificantDigits: digits })
+  return new Intl.NumberFormat(locale(), { maximumSignificantDigits: digits })
     .formatToParts(value)
     .map((part) => (part.type === 'group' ? '\u202f' : part.value))
     .join('');
 }
 
 export function format_fixed(value: number, decimals: number): string {
-  return new Intl.NumberFormat(current, {
+  return new Intl.NumberFormat(locale(), {
     minimumFractionDigits: decimals,
     maximumFractionDigits: decimals,
   })
@@ -93,10 +96,10 @@ export function format_signed(value: number, decimals: number): string {
 
 export function format_time(iso: string): string {
   if (/^\d{4}-\d{2}-\d{2}$/.test(iso)) {
-    return new Date(`${iso}T00:00:00Z`).toLocaleDateString(current, {
+    return new Date(`${iso}T00:00:00Z`).toLocaleDateString(locale(), {
       dateStyle: 'medium',
       timeZone: 'UTC',
     });
   }
-  return new Date(iso).toLocaleString(current, { dateStyle: 'medium', timeStyle: 'short' });
+  return new Date(iso).toLocaleString(locale(), { dateStyle: 'medium', timeStyle: 'short' });
 }

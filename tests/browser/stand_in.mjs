@@ -189,6 +189,7 @@ export class StandIn {
     response.setHeader('X-Content-Type-Options', 'nosniff');
     const [, id, part] = /^\/v1\/assessments\/([^/]+)(?:\/(.+))?$/.exec(url.pathname) ?? [];
     if (url.pathname === '/v1/parameters') return this.json(response, 200, parameters);
+    if (url.pathname === '/version') return this.json(response, 200, { program: 'stand-in', version: '0.0.0' });
     if (url.pathname === '/v1/assessments' && request.method === 'POST') return this.create(request, response);
     if (url.pathname === '/v1/assessments') return this.list(url, response);
     if (id) return this.one(id, part, response);

@@ -103,7 +103,7 @@ function Row(props: { of: Assessment; selected: boolean; full: boolean; on_selec
 function Rows(props: { items: Assessment[]; selected: string[]; on_select: (id: string) => void }) {
   const { items, selected } = props;
   return (
-    <div class="scroll" tabIndex={0} role="region" aria-label={t('list.title')}>
+    <div class="scroll" tabIndex={0} role="group" aria-label={t('list.title')}>
       <table class="numbers list">
         <thead>
           <tr>

@@ -2,7 +2,8 @@
 //
 // The report: one A4 page a side, on paper only. The daemon's GET .../report says the same in
 // English; this one is in the language of the page.
-import { section_path, type Parameters } from '../api.js';
+import { useEffect, useState } from 'preact/hooks';
+import { get_version, section_path, type Parameters } from '../api.js';
 import { format, format_fixed, format_percent, format_time, t } from '../i18n.js';
 import { param_name, Symbol_ } from '../form/field.js';
 import { general_caveats, warning_text } from '../result/caveats.js';
@@ -101,8 +102,8 @@ function Clusters(props: { of: Finished }) {
   );
 }
 
-function Report(props: { of: Finished; name: string; parameters: Parameters }) {
-  const { of, name, parameters } = props;
+function Report(props: { of: Finished; name: string; parameters: Parameters; version: string }) {
+  const { of, name, parameters, version } = props;
   const { risk, model } = of.result;
   const caveats = [
     ...(of.warnings ?? []).map((w) => warning_text(w, of, name, parameters.inputs)),
@@ -112,7 +113,13 @@ function Report(props: { of: Finished; name: string; parameters: Parameters }) {
     <article class="report">
       <header>
         <h2>{`${t('report.title')} · ${name}`}</h2>
-        <p>{[of.subject && t('result.subject', { subject: of.subject }), of.measured_at && t('result.measured', { time: format_time(of.measured_at) })].filter(Boolean).join(' · ')}</p>
+        <p>
+          {[
+            of.subject && t('result.subject', { subject: of.subject }),
+            of.label,
+            of.measured_at && t('result.measured', { time: format_time(of.measured_at) }),
+          ].filter(Boolean).join(' · ')}
+        </p>
       </header>
       <p class="verdict">
         <Shape of={risk.band} /> <strong>{t(`band.${risk.band}`)}</strong>
@@ -132,7 +139,13 @@ function Report(props: { of: Finished; name: string; parameters: Parameters }) {
       </section>
       <footer>
         <p class="ids">
-          {`${t('report.model')} ${model.name} ${model.version} · ${t('report.id')} ${of.id} · ${t('report.created')} ${format_time(of.created_at)} · ${t('report.printed', { time: format_time(new Date().toISOString()) })}`}
+          {[
+            version && t('report.program', { version }),
+            `${t('report.model')} ${model.name} ${model.version}`,
+            `${t('report.id')} ${of.id}`,
+            `${t('report.created')} ${format_time(of.created_at)}`,
+            t('report.printed', { time: format_time(new Date().toISOString()) }),
+          ].filter(Boolean).join(' · ')}
         </p>
         <p class="signature">{t('report.signature')}</p>
       </footer>
@@ -142,10 +155,14 @@ function Report(props: { of: Finished; name: string; parameters: Parameters }) {
 
 export function Reports(props: { documents: Finished[]; parameters: Parameters }) {
   const names = column_names(props.documents);
+  const [version, set_version] = useState('');
+  useEffect(() => {
+    get_version().then(set_version, () => undefined /* the report then names the model alone */);
+  }, []);
   return (
     <div class="reports">
       {props.documents.map((d, i) => (
-        <Report key={d.id} of={d} name={names[i] ?? ''} parameters={props.parameters} />
+        <Report key={d.id} of={d} name={names[i] ?? ''} parameters={props.parameters} version={version} />
       ))}
     </div>
   );

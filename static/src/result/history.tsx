@@ -108,7 +108,7 @@ export function History(props: { documents: Assessment[] }) {
       ) : (
         <div class="beside-chart">
           <Chart items={finished(items)} current={current} />
-          <div class="scroll" tabIndex={0} role="region" aria-labelledby="history">
+          <div class="scroll" tabIndex={0} role="group" aria-labelledby="history">
             <table class="numbers small">
               <thead>
                 <tr>

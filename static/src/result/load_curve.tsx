@@ -74,7 +74,7 @@ function Table(props: { points: LoadPoint[] }) {
   return (
     <details>
       <summary>{t('curve.table')}</summary>
-      <div class="scroll" tabIndex={0} role="region" aria-label={t('curve.table')}>
+      <div class="scroll" tabIndex={0} role="group" aria-label={t('curve.table')}>
         <table class="numbers small">
           <thead>
             <tr>

@@ -86,7 +86,7 @@ export function Numbers(props: { documents: Finished[]; inputs: ParameterInfo[] 
   return (
     <section class="panel-box" aria-labelledby="numbers">
       <h2 id="numbers">{t('numbers.title')}</h2>
-      <div class="scroll" tabIndex={0} role="region" aria-labelledby="numbers">
+      <div class="scroll" tabIndex={0} role="group" aria-labelledby="numbers">
         <table class="numbers">
           <thead>
             <tr>
