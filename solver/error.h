@@ -47,7 +47,7 @@ ischia_fail(struct ischia_error *err, enum ischia_code code, const char *file, i
 /* FAIL(err, code, format, ...): an expression whose value is the code. */
 #define FAIL(err, code, ...) ischia_fail((err), (code), __FILE__, __LINE__, __VA_ARGS__)
 
-/* CHECK(condition, err, code, format, ...): returns from the function when the condition is false. */
+/* CHECK(condition, err, code, format, ...): returns the code when the condition is false. */
 #define CHECK(condition, err, code, ...)                                                           \
     do {                                                                                           \
         if (!(condition)) return FAIL((err), (code), __VA_ARGS__);                                 \

@@ -54,8 +54,6 @@ struct mesh {
                                     and along +y: {axis, x1, x2, y1, y2}                         */
     int axis_count;
     struct mesh_divisions divisions;
-    /* Node numbers of the structured blocks, for prolongation between meshes; see mesh_local.c. */
-    int *block_node;
     double tip_z_mm, top_z_mm, muscle_z_mm, half_width_mm;
 };
 
@@ -63,6 +61,16 @@ struct mesh {
 ISCHIA_MUST_CHECK enum ischia_code mesh_local_init(struct mesh *ret, const struct ischia_case *c,
                                                    const struct mesh_divisions *divisions,
                                                    struct ischia_error *err);
+/*
+ * Carries a nodal field from one local mesh to another of the same case but other divisions, by
+ * trilinear interpolation in the blocks' own coordinates. from[node][3] -> ret_to[node][3].
+ */
+void mesh_local_prolong(const struct mesh_divisions *from_divisions, const double (*from)[3],
+                        const struct mesh_divisions *to_divisions, double (*ret_to)[3]);
+
+/* Number of nodes of the local mesh with these divisions. */
+int mesh_local_node_count(const struct mesh_divisions *divisions);
+
 void mesh_finish(struct mesh *mesh); /* frees the arrays; a zeroed mesh is allowed */
 
 /* True when indices are in range, every element has positive volume at its corners and centre,

@@ -35,7 +35,7 @@ struct ischia_observer {
 struct ischia_field {
     size_t node_count;
     double *displacement_mm; /* [node_count][3], in the order of the mesh that the case defines;
-                                seat frame: the outer skin starts at z = 0 and the seat stays there */
+                                seat frame: outer skin starts at z = 0, the seat stays there */
 };
 
 /* *ret_solver is the caller's to destroy. ISCHIA_E_MEMORY when it cannot be made. */

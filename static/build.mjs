@@ -13,7 +13,11 @@ const here = dirname(fileURLToPath(import.meta.url));
 const dist = join(here, 'dist');
 const first_page_limit = 100 * 1024;
 
-const exists = (path) => stat(path).then(() => true, () => false);
+const exists = (path) =>
+  stat(path).then(
+    () => true,
+    () => false,
+  );
 
 /* `table2:inputs` is examples/table2.csv as text; `table2:results` is what `make-reference.mjs`
  * made of it with `ischia cohort`, or null while nobody has run it: then no strip plot is shown. */
@@ -22,7 +26,11 @@ const table2 = {
   setup(bundle) {
     const files = {
       'table2:inputs': { path: join(here, '../examples/table2.csv'), loader: 'text', absent: '' },
-      'table2:results': { path: join(here, 'reference/table2.json'), loader: 'json', absent: 'null' },
+      'table2:results': {
+        path: join(here, 'reference/table2.json'),
+        loader: 'json',
+        absent: 'null',
+      },
     };
     bundle.onResolve({ filter: /^table2:/ }, (a) => ({ path: a.path, namespace: 'table2' }));
     bundle.onLoad({ filter: /.*/, namespace: 'table2' }, async (a) => {
@@ -39,7 +47,7 @@ const common = {
   target: ['es2022', 'chrome109', 'firefox115', 'safari16.4'],
   jsx: 'automatic',
   jsxImportSource: 'preact',
-  legalComments: 'none', /* licences.txt has them whole */
+  legalComments: 'none' /* licences.txt has them whole */,
   metafile: true,
   logLevel: 'warning',
   plugins: [table2],
@@ -48,14 +56,17 @@ const common = {
 async function first_page_bytes() {
   const files = ['index.html', 'assets/app.js', 'assets/app.css', 'assets/icon.svg'];
   const sizes = await Promise.all(
-    files.map(async (f) => gzipSync(await readFile(join(dist, f)), { level: 9 }).length));
+    files.map(async (f) => gzipSync(await readFile(join(dist, f)), { level: 9 }).length),
+  );
   return sizes.reduce((a, b) => a + b, 0);
 }
 
 /* The licence texts of the packages that ended up in a bundle: their terms ask for that. */
 async function write_licences(metafiles) {
   const inputs = metafiles.flatMap((m) => Object.keys(m.inputs));
-  const names = new Set(inputs.flatMap((path) => /node_modules\/((?:@[^/]+\/)?[^/]+)/.exec(path)?.[1] ?? []));
+  const names = new Set(
+    inputs.flatMap((path) => /node_modules\/((?:@[^/]+\/)?[^/]+)/.exec(path)?.[1] ?? []),
+  );
   const texts = [];
   for (const name of [...names].sort()) {
     const folder = join(here, 'node_modules', name);
@@ -81,8 +92,12 @@ await cp(join(here, 'public/icon.svg'), join(dist, 'assets/icon.svg'));
 await writeFile(join(dist, 'index.html'), await readFile(join(here, 'index.html')));
 
 const bytes = await first_page_bytes();
-console.log(`first page: ${(bytes / 1024).toFixed(1)} KB compressed (limit ${first_page_limit / 1024})`);
+console.log(
+  `first page: ${(bytes / 1024).toFixed(1)} KB compressed (limit ${first_page_limit / 1024})`,
+);
 if (bytes > first_page_limit) {
-  console.error('The first page is too large: move what it does not need at once out of src/main.tsx.');
+  console.error(
+    'The first page is too large: move what it does not need at once out of src/main.tsx.',
+  );
   process.exit(1);
 }

@@ -10,7 +10,7 @@ cd "$(dirname "$0")"
 
 # `npm ci` only when the lock file is not what is installed: a rebuild then takes a second.
 if ! cmp -s package-lock.json node_modules/.ischia-lock; then
-    npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+    npm ci --ignore-scripts --no-audit --no-fund --loglevel=error >&2
     cp package-lock.json node_modules/.ischia-lock
 fi
 node build.mjs

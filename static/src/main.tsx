@@ -27,20 +27,31 @@ function Header(props: { route: Route; on_language: (l: Language) => void }) {
   const { page } = props.route;
   return (
     <header class="top">
-      <a class="skip" href="#content">{t('app.skip')}</a>
+      <a class="skip" href="#content">
+        {t('app.skip')}
+      </a>
       <p class="brand">
         <strong>{t('app.title')}</strong>
         <span>{t('app.tagline')}</span>
       </p>
       <nav aria-label={t('nav.main')}>
-        <Link to={form_address()} current={page === 'form'}>{t('nav.new')}</Link>
-        <Link to={list_address} current={page === 'list'}>{t('nav.past')}</Link>
+        <Link to={form_address()} current={page === 'form'}>
+          {t('nav.new')}
+        </Link>
+        <Link to={list_address} current={page === 'list'}>
+          {t('nav.past')}
+        </Link>
       </nav>
       <label class="language">
         <span class="visually-hidden">{t('app.language')}</span>
-        <select value={language()} onChange={(e) => props.on_language(e.currentTarget.value as Language)}>
+        <select
+          value={language()}
+          onChange={(e) => props.on_language(e.currentTarget.value as Language)}
+        >
           {Object.entries(language_names).map(([code, name]) => (
-            <option key={code} value={code} lang={code}>{name}</option>
+            <option key={code} value={code} lang={code}>
+              {name}
+            </option>
           ))}
         </select>
       </label>

@@ -10,7 +10,9 @@ export type Parsed =
   | { kind: 'not_a_number' };
 
 export function parse_number(text: string): Parsed {
-  const trimmed = text.replace(/^[\s\u00a0\u202f]+|[\s\u00a0\u202f]+$/g, '').replace(/^\u2212/, '-');
+  const trimmed = text
+    .replace(/^[\s\u00a0\u202f]+|[\s\u00a0\u202f]+$/g, '')
+    .replace(/^\u2212/, '-');
   if (trimmed === '') return { kind: 'empty' };
   if (!/^[+-]?[\d.,]*\d[\d.,]*$/.test(trimmed)) return { kind: 'not_a_number' };
   if ((trimmed.match(/[.,]/g) ?? []).length > 1) return { kind: 'ambiguous' };

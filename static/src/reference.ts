@@ -25,8 +25,7 @@ export function comparable_sides(documents: Assessment[]): ReferenceSide[] {
   const set: ReferenceSet | null = results;
   if (!set) return [];
   const same = documents.every(
-    (d) =>
-      d.result?.model.name === set.model.name && d.result.model.version === set.model.version,
+    (d) => d.result?.model.name === set.model.name && d.result.model.version === set.model.version,
   );
   return same ? set.sides : [];
 }

@@ -9,14 +9,28 @@ import { chromium } from 'playwright-core';
 import { StandIn } from './stand_in.mjs';
 
 export const dist = fileURLToPath(new URL('../../static/dist', import.meta.url));
-const axe_source = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+const axe_source = readFileSync(
+  createRequire(import.meta.url).resolve('axe-core/axe.min.js'),
+  'utf8',
+);
 
 const flags = [
-  '--headless', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
-  '--disable-component-update', '--disable-sync', '--disable-default-apps', '--no-default-browser-check',
+  '--headless',
+  '--no-sandbox',
+  '--disable-quic',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+  '--disable-default-apps',
+  '--no-default-browser-check',
 ];
 /* WebGL drawn in software, for the 3-D view; or none at all, as on many a workstation. */
-const with_webgl = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+const with_webgl = [
+  '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader',
+  '--ignore-gpu-blocklist',
+];
 const without_webgl = ['--disable-gpu', '--disable-3d-apis'];
 
 export function launch({ webgl = false } = {}) {
@@ -29,13 +43,17 @@ export function launch({ webgl = false } = {}) {
 /* A page whose every request, error and CSP violation is recorded. */
 export async function watched_page(browser, origin, options = {}) {
   const context = await browser.newContext({
-    viewport: { width: 1366, height: 768 }, locale: 'en-GB', timezoneId: 'UTC', ...options,
+    viewport: { width: 1366, height: 768 },
+    locale: 'en-GB',
+    timezoneId: 'UTC',
+    ...options,
   });
   const page = await context.newPage();
   const seen = { foreign: [], errors: [], violations: [] };
   page.on('request', (r) => {
     const url = r.url();
-    if (!url.startsWith(origin) && !url.startsWith('blob:') && !url.startsWith('data:')) seen.foreign.push(url);
+    if (!url.startsWith(origin) && !url.startsWith('blob:') && !url.startsWith('data:'))
+      seen.foreign.push(url);
   });
   page.on('pageerror', (e) => seen.errors.push(e.message));
   page.on('console', (m) => {
@@ -53,10 +71,14 @@ export function assert_clean(page) {
 /* No WCAG 2.2 AA violation, nor of axe's best practices, on the page as it stands. */
 export async function assert_accessible(page, what) {
   await page.evaluate(axe_source);
-  const { violations, passes } = await page.evaluate(() => window.axe.run(document, {
-    runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'],
-  }));
-  const found = violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html.slice(0, 160)).join(' | ')}`);
+  const { violations, passes } = await page.evaluate(() =>
+    window.axe.run(document, {
+      runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'],
+    }),
+  );
+  const found = violations.map(
+    (v) => `${v.id}: ${v.nodes.map((n) => n.html.slice(0, 160)).join(' | ')}`,
+  );
   assert.deepEqual(found, [], what);
   assert.ok(passes.length > 10, `${what}: axe looked at too little`);
 }
@@ -67,7 +89,9 @@ export async function stage(options) {
   const origin = await daemon.start();
   const browser = await launch(options);
   return {
-    daemon, origin, browser,
+    daemon,
+    origin,
+    browser,
     page: (page_options) => watched_page(browser, origin, page_options),
     finish: async () => {
       await browser.close();

@@ -16,7 +16,8 @@ function positions(p) {
         const [x, y] = [half * (i / cells.radial) ** 1.5, half * (j / cells.radial) ** 1.5];
         const bowl = Math.min(p.R1, p.R1 * ((x / 18) ** 2 + (y / 9) ** 2));
         const top = tip + bowl;
-        const z = k < 4 ? layers[k] : layers[3] + (top - layers[3]) * ((k - 3) / (cells.layers - 3));
+        const z =
+          k < 4 ? layers[k] : layers[3] + (top - layers[3]) * ((k - 3) / (cells.layers - 3));
         const tied = k === cells.layers && bowl < p.R1;
         const squeeze = 0.55 * Math.exp(-((x / 30) ** 2 + (y / 30) ** 2));
         const u_z = tied ? -0.55 * tip : -squeeze * z;
@@ -35,8 +36,16 @@ function corners() {
   for (let k = 0; k < cells.layers; k++)
     for (let j = 0; j < cells.radial; j++)
       for (let i = 0; i < cells.radial; i++)
-        list.push([at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k),
-          at(i, j, k + 1), at(i + 1, j, k + 1), at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)]);
+        list.push([
+          at(i, j, k),
+          at(i + 1, j, k),
+          at(i + 1, j + 1, k),
+          at(i, j + 1, k),
+          at(i, j, k + 1),
+          at(i + 1, j, k + 1),
+          at(i + 1, j + 1, k + 1),
+          at(i, j + 1, k + 1),
+        ]);
   return list;
 }
 
@@ -53,24 +62,55 @@ function array(type, name, values, components = 1) {
 export function field_vtu(p) {
   const nodes = positions(p);
   const hexes = corners();
-  const centre = hexes.map((h) => [0, 1, 2].map((a) => h.reduce((s, n) => s + [nodes[n].x, nodes[n].y, nodes[n].z][a], 0) / 8));
+  const centre = hexes.map((h) =>
+    [0, 1, 2].map((a) => h.reduce((s, n) => s + [nodes[n].x, nodes[n].y, nodes[n].z][a], 0) / 8),
+  );
   const layer = hexes.map((_, e) => Math.floor(e / cells.radial ** 2));
   const tissue = layer.map((k) => (k === 0 ? 2 : k < 3 ? 1 : 0));
   const tip = 1 + p.eF + p.eM;
-  const shear = centre.map(([x, y, z]) => 1.5 * Math.exp(-((x * x + y * y) / 250 + (z - tip) ** 2 / 150)));
+  const shear = centre.map(
+    ([x, y, z]) => 1.5 * Math.exp(-((x * x + y * y) / 250 + (z - tip) ** 2 / 150)),
+  );
   const cluster = shear.map((E, e) => (E > 0.75 && tissue[e] === 0 ? 1 : 0));
   return [
     '<?xml version="1.0" encoding="UTF-8"?>\n',
     '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n<UnstructuredGrid>\n',
     `<Piece NumberOfPoints="${nodes.length}" NumberOfCells="${hexes.length}">\n<PointData>\n`,
-    array('Float64', 'displacement', nodes.flatMap((n) => n.u), 3), '</PointData>\n<CellData>\n',
-    array('UInt8', 'tissue', tissue), array('Float64', 'E_shear', shear),
-    array('Float64', 'E_comp', shear.map((E) => 0.45 * Math.min(1.1, E))), array('Int32', 'cluster', cluster),
+    array(
+      'Float64',
+      'displacement',
+      nodes.flatMap((n) => n.u),
+      3,
+    ),
+    '</PointData>\n<CellData>\n',
+    array('UInt8', 'tissue', tissue),
+    array('Float64', 'E_shear', shear),
+    array(
+      'Float64',
+      'E_comp',
+      shear.map((E) => 0.45 * Math.min(1.1, E)),
+    ),
+    array('Int32', 'cluster', cluster),
     '</CellData>\n<Points>\n',
-    array('Float64', 'Points', nodes.flatMap((n) => [n.x + n.u[0], n.y + n.u[1], n.z + n.u[2]]), 3),
+    array(
+      'Float64',
+      'Points',
+      nodes.flatMap((n) => [n.x + n.u[0], n.y + n.u[1], n.z + n.u[2]]),
+      3,
+    ),
     '</Points>\n<Cells>\n',
-    array('Int32', 'connectivity', hexes.flat()), array('Int32', 'offsets', hexes.map((_, i) => 8 * (i + 1))),
-    array('UInt8', 'types', hexes.map(() => 12)), '</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n',
+    array('Int32', 'connectivity', hexes.flat()),
+    array(
+      'Int32',
+      'offsets',
+      hexes.map((_, i) => 8 * (i + 1)),
+    ),
+    array(
+      'UInt8',
+      'types',
+      hexes.map(() => 12),
+    ),
+    '</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n',
   ].join('');
 }
 

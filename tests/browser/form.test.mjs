@@ -3,11 +3,22 @@
 // without JavaScript.
 import assert from 'node:assert/strict';
 import { after, afterEach, before, beforeEach, test } from 'node:test';
-import { assert_accessible, assert_clean, fill_side, open_form, reading, sample, stage, submit_and_wait } from './browser.mjs';
+import {
+  assert_accessible,
+  assert_clean,
+  fill_side,
+  open_form,
+  reading,
+  sample,
+  stage,
+  submit_and_wait,
+} from './browser.mjs';
 import { parameters } from './stand_in.mjs';
 
 let s, page;
-before(async () => { s = await stage(); });
+before(async () => {
+  s = await stage();
+});
 after(() => s.finish());
 beforeEach(async () => {
   page = await s.page();
@@ -46,8 +57,12 @@ test('two decimal marks are refused as typed', async () => {
 
 test('what is no number, too small or too large is refused beside its field', async () => {
   const cases = [
-    ['eM', '3x', /Not a number/], ['eM', '61', /Above 60 mm/], ['eM', '4', /Below 5 mm/],
-    ['eM', '-20', /Below 5 mm/], ['muM', '0,4', /Below 0.5 kPa/], ['F', '601', /Above 600 N/],
+    ['eM', '3x', /Not a number/],
+    ['eM', '61', /Above 60 mm/],
+    ['eM', '4', /Below 5 mm/],
+    ['eM', '-20', /Below 5 mm/],
+    ['muM', '0,4', /Below 0.5 kPa/],
+    ['F', '601', /Above 600 N/],
   ];
   for (const [key, text, expected] of cases) {
     await page.fill(`#right-${key}`, text);
@@ -160,18 +175,25 @@ test('a sample person fills both sides with one click', async () => {
   await page.getByRole('button', { name: 'Fill in' }).click();
   for (const side of ['left', 'right'])
     for (const [key, text] of Object.entries(sample[side]))
-      assert.equal(Number(await page.inputValue(`#${side}-${key}`)), Number(text), `${side} ${key}`);
+      assert.equal(
+        Number(await page.inputValue(`#${side}-${key}`)),
+        Number(text),
+        `${side} ${key}`,
+      );
   assert.equal(await page.inputValue('#subject'), 'table2-1');
   assert.equal(await page.locator('#sample option').count(), 13);
   await assert_accessible(page, 'the filled form');
 });
 
 test('the drawing is to scale and shows a slip of the decimal mark', async () => {
-  const layer = async (name) => Number(await page.locator(`.side.left .tissue.${name}`).getAttribute('height'));
+  const layer = async (name) =>
+    Number(await page.locator(`.side.left .tissue.${name}`).getAttribute('height'));
   assert.equal(await page.locator('.side.left .drawing .tissue').count(), 0);
   await fill_side(page, 'left');
   const [fat, muscle] = [await layer('fat'), await layer('muscle')];
-  assert.ok(Math.abs(muscle / fat - (31 + 7.1) / 10) < 1e-6); /* muscle up to the top of the tissue */
+  assert.ok(
+    Math.abs(muscle / fat - (31 + 7.1) / 10) < 1e-6,
+  ); /* muscle up to the top of the tissue */
   const ring = () => page.locator('.side.left .bone').nth(1).getAttribute('d');
   const before_slip = await ring();
   await page.fill('#left-R2', '228');
@@ -202,7 +224,10 @@ test('Tab goes through the left side, then the right, then the button', async ()
     if (id === 'submit') break;
   }
   const keys = parameters.parameters.map((p) => p.key);
-  assert.deepEqual(visited, ['left', 'right'].flatMap((side) => keys.map((key) => `${side}-${key}`)));
+  assert.deepEqual(
+    visited,
+    ['left', 'right'].flatMap((side) => keys.map((key) => `${side}-${key}`)),
+  );
 });
 
 test('a keyboard is enough to compute', async () => {
@@ -212,7 +237,11 @@ test('a keyboard is enough to compute', async () => {
     const id = await page.evaluate(() => document.activeElement.id);
     const next = id === 'left-F' ? 'Enter' : 'Tab';
     await page.keyboard.press(next);
-    while (next === 'Tab' && !(await page.evaluate(() => /^left-\w+$/.test(document.activeElement.id)))) await page.keyboard.press('Tab');
+    while (
+      next === 'Tab' &&
+      !(await page.evaluate(() => /^left-\w+$/.test(document.activeElement.id)))
+    )
+      await page.keyboard.press('Tab');
   }
   await page.waitForURL('**/assessments/**');
   await page.locator('.glance').waitFor();

@@ -6,14 +6,19 @@ import { assert_accessible, sample, stage } from './browser.mjs';
 import { parameters } from './stand_in.mjs';
 
 let s;
-before(async () => { s = await stage(); });
+before(async () => {
+  s = await stage();
+});
 after(() => s.finish());
 
 test('the plain form repeats the limits that the daemon serves', async () => {
   const page = await s.page({ javaScriptEnabled: false });
   await page.goto(`${s.origin}/`);
   for (const { key, unit, accepted } of parameters.parameters) {
-    assert.equal(await page.locator(`#${key}-range`).innerText(), `${accepted.min} to ${accepted.max} ${unit}`);
+    assert.equal(
+      await page.locator(`#${key}-range`).innerText(),
+      `${accepted.min} to ${accepted.max} ${unit}`,
+    );
   }
   await page.context().close();
 });

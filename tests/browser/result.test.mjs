@@ -6,12 +6,23 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { execFileSync } from 'node:child_process';
 import { after, afterEach, before, beforeEach, test } from 'node:test';
-import { assert_accessible, assert_clean, fill_side, open_form, stage, submit_and_wait } from './browser.mjs';
+import {
+  assert_accessible,
+  assert_clean,
+  fill_side,
+  open_form,
+  stage,
+  submit_and_wait,
+} from './browser.mjs';
 
 let s, page;
-before(async () => { s = await stage(); });
+before(async () => {
+  s = await stage();
+});
 after(() => s.finish());
-beforeEach(async () => { page = await s.page(); });
+beforeEach(async () => {
+  page = await s.page();
+});
 afterEach(async () => {
   assert_clean(page);
   await page.context().close();
@@ -26,23 +37,39 @@ async function compute(subject, sides = ['left', 'right'], options = {}) {
   await page.waitForURL('**/assessments/**');
 }
 
-const all_ended = (n) => page.waitForFunction((k) => document.querySelectorAll('.glance').length === k, n);
+const all_ended = (n) =>
+  page.waitForFunction((k) => document.querySelectorAll('.glance').length === k, n);
 
 test('both sides: outcome in words, volumes, forces, error, caveats in sight', async () => {
   await compute('P-1');
   await all_ended(2);
   const card = page.getByRole('region', { name: 'Left', exact: true });
   const text = await card.innerText();
-  for (const part of [/Both thresholds crossed/, /14\s400\smm³, 9\.7\s%/, /1\.243 ± 0\.011/, /from 33 N, 13\s% of the 258 N/, /centred 6\.4 mm below/])
+  for (const part of [
+    /Both thresholds crossed/,
+    /14\s400\smm³, 9\.7\s%/,
+    /1\.243 ± 0\.011/,
+    /from 33 N, 13\s% of the 258 N/,
+    /centred 6\.4 mm below/,
+  ])
     assert.match(text, part);
-  for (const caveat of ['animal experiments', 'reads higher', 'Never compare', 'Not a medical device'])
+  for (const caveat of [
+    'animal experiments',
+    'reads higher',
+    'Never compare',
+    'Not a medical device',
+  ])
     assert.ok(await page.locator('.caveats', { hasText: caveat }).isVisible(), caveat);
   assert.match(await page.locator('#announcer').innerText(), /Both thresholds crossed/);
   await assert_accessible(page, 'the result of both sides');
 });
 
 test('every band says what it means, by shape and word', async () => {
-  const words = { below: 'Below both thresholds', shear: 'Shear threshold crossed', compression: 'Compression threshold crossed' };
+  const words = {
+    below: 'Below both thresholds',
+    shear: 'Shear threshold crossed',
+    compression: 'Compression threshold crossed',
+  };
   const drawn = new Set();
   for (const [band, expected] of Object.entries(words)) {
     await compute(`${band}-1`, ['left']);
@@ -99,9 +126,14 @@ test('an unknown assessment is said to be unknown', async () => {
 });
 
 test('outside the studied range is said with the result', async () => {
-  await compute('P-2', ['left'], { left: { R1: '7.1', R2: '22.8', eM: '31', eF: '10', muM: '12', muF: '5', F: '258' } });
+  await compute('P-2', ['left'], {
+    left: { R1: '7.1', R2: '22.8', eM: '31', eF: '10', muM: '12', muF: '5', F: '258' },
+  });
   await all_ended(1);
-  assert.match(await page.locator('.caveats').innerText(), /Left: muM = 12 kPa is outside the range studied in the paper \(1 to 8\)/);
+  assert.match(
+    await page.locator('.caveats').innerText(),
+    /Left: muM = 12 kPa is outside the range studied in the paper \(1 to 8\)/,
+  );
 });
 
 test('numbers stand in tables beside the charts', async () => {
@@ -143,7 +175,18 @@ test('history of the same subject, and the list, its filter and its comparison',
 });
 
 test('the list pages through what is older', async () => {
-  for (let i = 0; i < 55; i++) s.daemon.add({ subject: 'cancelled-many', side: 'left', R1: 7, R2: 20, eM: 30, eF: 10, muM: 8, muF: 5, F: 200 }).status = 'cancelled';
+  for (let i = 0; i < 55; i++)
+    s.daemon.add({
+      subject: 'cancelled-many',
+      side: 'left',
+      R1: 7,
+      R2: 20,
+      eM: 30,
+      eF: 10,
+      muM: 8,
+      muF: 5,
+      F: 200,
+    }).status = 'cancelled';
   await page.goto(`${s.origin}/assessments?subject=cancelled-many`);
   await page.getByRole('link', { name: 'Older' }).click();
   await page.waitForFunction(() => document.querySelectorAll('table.list tbody tr').length === 5);
@@ -162,11 +205,27 @@ test('the report prints on one A4 page a side and says what it must', async () =
   try {
     const file = join(folder, 'report.pdf');
     await page.pdf({ path: file, preferCSSPageSize: true });
-    assert.match(execFileSync('pdfinfo', [file], { encoding: 'utf8' }), /Pages:\s+2\n[^]*Page size:\s+59\d\.\d+ x 84\d\.\d+/);
+    assert.match(
+      execFileSync('pdfinfo', [file], { encoding: 'utf8' }),
+      /Pages:\s+2\n[^]*Page size:\s+59\d\.\d+ x 84\d\.\d+/,
+    );
     const text = execFileSync('pdftotext', ['-layout', file, '-'], { encoding: 'utf8' });
     const first = text.split('\f')[0];
-    for (const part of [/Tissue strain report · Left/, /Subject P-5/, /Both thresholds crossed/, /22\.8\s+mm/, /ε max\s+engineering\s+1\.243 ± 0\.011/,
-      /E shear\s+Green–Lagrange/, /14\s400\s+9\.7\s%\s+1\s+33 N/, /animal experiments/, /Not a medical device/, /Ischia 0\.0\.0/, /macron2020-local 1/, /0192f0c1-/, /signature/])
+    for (const part of [
+      /Tissue strain report · Left/,
+      /Subject P-5/,
+      /Both thresholds crossed/,
+      /22\.8\s+mm/,
+      /ε max\s+engineering\s+1\.243 ± 0\.011/,
+      /E shear\s+Green–Lagrange/,
+      /14\s400\s+9\.7\s%\s+1\s+33 N/,
+      /animal experiments/,
+      /Not a medical device/,
+      /Ischia 0\.0\.0/,
+      /macron2020-local 1/,
+      /0192f0c1-/,
+      /signature/,
+    ])
       assert.match(first, part);
     assert.doesNotMatch(text, /Change and compute again/);
     assert.ok((await readFile(file)).length > 5000);
@@ -177,7 +236,8 @@ test('the report prints on one A4 page a side and says what it must', async () =
 
 test('the list can be saved for a spreadsheet', async () => {
   await page.route('**/v1/assessments?*', async (route) => {
-    if (!(await route.request().headerValue('accept')).includes('text/csv')) return route.continue();
+    if (!(await route.request().headerValue('accept')).includes('text/csv'))
+      return route.continue();
     return route.fulfill({ contentType: 'text/csv', body: 'id,subject\n1,P-4\n' });
   });
   await page.goto(`${s.origin}/assessments`);
@@ -190,10 +250,16 @@ test('nothing moves for those who asked for stillness', async () => {
   await page.emulateMedia({ reducedMotion: 'reduce' });
   await compute('P-6');
   await all_ended(2);
-  const moving = await page.evaluate(() => [...document.querySelectorAll('*')].filter((e) => {
-    const style = getComputedStyle(e);
-    return style.transitionDuration.split(',').some((d) => parseFloat(d) > 0) || style.animationName !== 'none';
-  }).length);
+  const moving = await page.evaluate(
+    () =>
+      [...document.querySelectorAll('*')].filter((e) => {
+        const style = getComputedStyle(e);
+        return (
+          style.transitionDuration.split(',').some((d) => parseFloat(d) > 0) ||
+          style.animationName !== 'none'
+        );
+      }).length,
+  );
   assert.equal(moving, 0);
 });
 
@@ -204,7 +270,10 @@ test('a phone shows everything without sideways scrolling', async () => {
   for (const address of [page.url(), `${s.origin}/`, `${s.origin}/assessments`]) {
     await page.goto(address);
     await page.locator('h1').waitFor();
-    const [content, view] = await page.evaluate(() => [document.documentElement.scrollWidth, window.innerWidth]);
+    const [content, view] = await page.evaluate(() => [
+      document.documentElement.scrollWidth,
+      window.innerWidth,
+    ]);
     assert.ok(content <= view, `${address}: ${content} > ${view}`);
     await assert_accessible(page, `${address} on a phone`);
   }

@@ -16,7 +16,7 @@ fi
 exec 9>.install-lock
 flock 9
 if ! cmp -s package-lock.json node_modules/.ischia-lock; then
-    npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+    npm ci --ignore-scripts --no-audit --no-fund --loglevel=error >&2
     cp package-lock.json node_modules/.ischia-lock
 fi
 exec 9>&-

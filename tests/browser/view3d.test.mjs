@@ -4,10 +4,21 @@
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { after, before, test } from 'node:test';
-import { assert_accessible, assert_clean, fill_side, launch, open_form, stage, submit_and_wait, watched_page } from './browser.mjs';
+import {
+  assert_accessible,
+  assert_clean,
+  fill_side,
+  launch,
+  open_form,
+  stage,
+  submit_and_wait,
+  watched_page,
+} from './browser.mjs';
 
 let s;
-before(async () => { s = await stage({ webgl: true }); });
+before(async () => {
+  s = await stage({ webgl: true });
+});
 after(() => s.finish());
 
 async function result_page(page, origin = s.origin) {
@@ -17,17 +28,19 @@ async function result_page(page, origin = s.origin) {
 }
 
 /* How many distinct colours a PNG of the view has, told by the browser itself. */
-const colours_of = (page, png) => page.evaluate(async (base64) => {
-  const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-  const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-  const canvas = new OffscreenCanvas(image.width, image.height);
-  const context = canvas.getContext('2d');
-  context.drawImage(image, 0, 0);
-  const { data } = context.getImageData(0, 0, image.width, image.height);
-  const seen = new Set();
-  for (let i = 0; i < data.length; i += 4) seen.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
-  return seen.size;
-}, png.toString('base64'));
+const colours_of = (page, png) =>
+  page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    const seen = new Set();
+    for (let i = 0; i < data.length; i += 4)
+      seen.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
+    return seen.size;
+  }, png.toString('base64'));
 
 test('the bundle is fetched only when the view is opened, and the view draws', async () => {
   const page = await s.page();
@@ -77,7 +90,10 @@ test('the load slider walks the computed load path from nothing to full', async 
   await slider.focus();
   await page.keyboard.press('Home');
   assert.match(await output.innerText(), /^0 N · travel 0\.0 mm/);
-  assert.match(await page.locator('.view3d .load .hint').innerText(), /scaled to the computed seat travel/);
+  assert.match(
+    await page.locator('.view3d .load .hint').innerText(),
+    /scaled to the computed seat travel/,
+  );
   await assert_accessible(page, 'the 3-D view, unloaded');
   assert_clean(page);
   await page.context().close();
@@ -116,7 +132,11 @@ test('without WebGL the section takes its place', async () => {
   await page.getByRole('button', { name: '3-D' }).click();
   await page.getByText('cannot draw 3-D (no WebGL)').waitFor();
   assert.ok(await page.locator('.picture img').isVisible());
-  assert.ok(!(await page.evaluate(() => performance.getEntriesByType('resource').some((e) => e.name.includes('view3d')))));
+  assert.ok(
+    !(await page.evaluate(() =>
+      performance.getEntriesByType('resource').some((e) => e.name.includes('view3d')),
+    )),
+  );
   await assert_accessible(page, 'the result without WebGL');
   assert_clean(page);
   await browser.close();

@@ -60,7 +60,13 @@ function nice_bar(k: number): number {
 function Layer(props: { s: Scale; from: number; to: number; name: string }) {
   const { s, from, to, name } = props;
   return (
-    <rect class={`tissue ${name}`} x="0" width={px.width} y={s.y(to)} height={s.y(from) - s.y(to)} />
+    <rect
+      class={`tissue ${name}`}
+      x="0"
+      width={px.width}
+      y={s.y(to)}
+      height={s.y(from) - s.y(to)}
+    />
   );
 }
 
@@ -86,7 +92,9 @@ function Heading(props: { x: number; text: string; size: string }) {
   return (
     <text class="half end" x={props.x} y="14">
       {props.text}
-      <tspan x={props.x} dy="13">{props.size}</tspan>
+      <tspan x={props.x} dy="13">
+        {props.size}
+      </tspan>
     </text>
   );
 }
@@ -102,7 +110,11 @@ function Labels(props: { s: Scale; g: Geometry; tip: number; top: number }) {
       <Dimension s={s} from={g.skin} to={interface_z} at={12} text={`eF ${format(g.eF)}`} />
       <Heading x={px.width / 2 - 8} text={t('drawing.across')} size={`R1 ${format(g.R1)}`} />
       <Heading x={px.width - 8} text={t('drawing.along')} size={`R2 ${format(g.R2)}`} />
-      <text class="end" x={px.width - 8} y={Math.max(s.y((interface_z + tip) / 2) + 4, s.y(top) + 14)}>
+      <text
+        class="end"
+        x={px.width - 8}
+        y={Math.max(s.y((interface_z + tip) / 2) + 4, s.y(top) + 14)}
+      >
         {t('drawing.muscle')}
       </text>
       <text class="end" x={px.width - 8} y={s.y((g.skin + interface_z) / 2) + 4}>
@@ -110,7 +122,9 @@ function Labels(props: { s: Scale; g: Geometry; tip: number; top: number }) {
       </text>
       <path class="bar" d={`M${px.width - 8} ${y_seat + 11}v6h${-bar * s.k}v-6`} />
       <text class="end" x={px.width - 14 - bar * s.k} y={y_seat + 18}>{`${bar} mm`}</text>
-      <text x="8" y={y_seat + 18}>{t('drawing.seat')}</text>
+      <text x="8" y={y_seat + 18}>
+        {t('drawing.seat')}
+      </text>
     </>
   );
 }

@@ -28,7 +28,10 @@ function Errors(props: { failure: Failure }) {
         <ul>
           {fields.map(({ side, key, text: fault }) => (
             <li key={side + key}>
-              <a href={`#${field_id(side, key)}`} onClick={(e) => focus_field(e, field_id(side, key))}>
+              <a
+                href={`#${field_id(side, key)}`}
+                onClick={(e) => focus_field(e, field_id(side, key))}
+              >
                 {`${t(`side.${side}`)}, ${key}`}
               </a>
               {`: ${fault}`}
@@ -58,7 +61,9 @@ function Loading(props: { failed: boolean; again: () => void }) {
       {props.failed ? (
         <div class="errors" role="alert">
           <p>{t('form.loading.failed')}</p>
-          <button type="button" onClick={props.again}>{t('form.retry')}</button>
+          <button type="button" onClick={props.again}>
+            {t('form.retry')}
+          </button>
         </div>
       ) : (
         <p class="loading">{t('form.loading')}</p>
@@ -103,7 +108,9 @@ export function FormPage(props: { from: string[] }) {
         <button type="submit" class="primary" aria-disabled={sending}>
           {sending ? t('form.submitting') : submit_label(form.filled)}
         </button>
-        <button type="button" class="quiet" onClick={form.clear}>{t('form.clear')}</button>
+        <button type="button" class="quiet" onClick={form.clear}>
+          {t('form.clear')}
+        </button>
         <span class="hint">{t('form.partial')}</span>
         <Resolution
           names={parameters.resolutions}

@@ -64,11 +64,7 @@ function range_finding(value: number, info: ParameterInfo, typing: boolean): Fin
 }
 
 /* The fault or the warning of one field, or null. `typing`: the cursor is still in it. */
-export function finding(
-  entry: SideEntry,
-  info: ParameterInfo,
-  typing: boolean,
-): Finding | null {
+export function finding(entry: SideEntry, info: ParameterInfo, typing: boolean): Finding | null {
   const p = parsed(entry, info.key);
   if (p.kind === 'empty') return null;
   if (p.kind === 'ambiguous') {

@@ -90,7 +90,8 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   useEffect(() => {
     if (from.length === 0) return;
     Promise.all(from.map(get_assessment)).then(
-      (documents) => restart(entries_of(documents), { ...nobody, subject: documents[0]?.subject ?? '' }),
+      (documents) =>
+        restart(entries_of(documents), { ...nobody, subject: documents[0]?.subject ?? '' }),
       () => undefined /* erased since: the form stays empty */,
     );
   }, [from.join()]);
@@ -163,8 +164,17 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   };
 
   return {
-    person, entries, refused, failure, sending, filled,
-    set_person, change_side, copy_stiffness, fill_sample, send,
+    person,
+    entries,
+    refused,
+    failure,
+    sending,
+    filled,
+    set_person,
+    change_side,
+    copy_stiffness,
+    fill_sample,
+    send,
     clear: (): void => restart(nothing(), nobody),
   };
 }

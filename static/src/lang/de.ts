@@ -21,11 +21,14 @@ export const de: Strings = {
   'side.none.short': '–',
 
   'param.R1.name': 'Kleiner Knochenradius',
-  'param.R1.help': 'Krümmungsradius des Sitzbeins an seinem tiefsten Punkt, in der Ebene, in der er am kleinsten ist.',
+  'param.R1.help':
+    'Krümmungsradius des Sitzbeins an seinem tiefsten Punkt, in der Ebene, in der er am kleinsten ist.',
   'param.R2.name': 'Großer Knochenradius',
-  'param.R2.help': 'Krümmungsradius des Sitzbeins in der Ebene senkrecht zu R1. Nie kleiner als R1.',
+  'param.R2.help':
+    'Krümmungsradius des Sitzbeins in der Ebene senkrecht zu R1. Nie kleiner als R1.',
   'param.eM.name': 'Muskeldicke',
-  'param.eM.help': 'Dicke des Muskels unter dem Sitzbein, unbelastet. Wenn Sie die Gesamtdicke von Muskel und Fett haben, wählen Sie „gesamt“: eM ist dann gesamt minus eF.',
+  'param.eM.help':
+    'Dicke des Muskels unter dem Sitzbein, unbelastet. Wenn Sie die Gesamtdicke von Muskel und Fett haben, wählen Sie „gesamt“: eM ist dann gesamt minus eF.',
   'param.eF.name': 'Fettdicke',
   'param.eF.help': 'Dicke des Fetts unter dem Sitzbein, unbelastet.',
   'param.muM.name': 'Muskelsteifigkeit',
@@ -33,7 +36,8 @@ export const de: Strings = {
   'param.muF.name': 'Fettsteifigkeit',
   'param.muF.help': 'Schubmodul des Fetts (Ogden-Gesetz, Exponent 5).',
   'param.F.name': 'Kraft auf dieser Seite',
-  'param.F.help': 'Senkrechte Kraft, die der Sitz unter diesem einen Sitzbein trägt, im Sitzen: die ganze Seite.',
+  'param.F.help':
+    'Senkrechte Kraft, die der Sitz unter diesem einen Sitzbein trägt, im Sitzen: die ganze Seite.',
 
   'form.title': 'Neue Auswertung',
   'form.person': 'Person',
@@ -47,7 +51,8 @@ export const de: Strings = {
   'form.sample': 'Beispielperson',
   'form.sample.option': 'Tabelle 2, Person {n}',
   'form.sample.fill': 'Einsetzen',
-  'form.sample.filled': 'Beide Seiten mit Person {n} aus Tabelle 2 (Macron et al. 2020) ausgefüllt.',
+  'form.sample.filled':
+    'Beide Seiten mit Person {n} aus Tabelle 2 (Macron et al. 2020) ausgefüllt.',
   'form.clear': 'Leeren',
   'form.copy': 'Steifigkeit auf die andere Seite übernehmen',
   'form.total': 'gesamt',
@@ -68,8 +73,10 @@ export const de: Strings = {
   'form.error.title': 'Bitte berichtigen:',
   'form.error.empty': 'Geben Sie die sieben Zahlen mindestens einer Seite ein.',
   'form.error.server': 'Der Server hat es abgelehnt: {detail}',
-  'form.error.busy': 'Die Warteschlange ist voll. Nichts ist verloren: gleich noch einmal versuchen.',
-  'form.error.unreachable': 'Der Server antwortet nicht. Nichts ist verloren: noch einmal versuchen.',
+  'form.error.busy':
+    'Die Warteschlange ist voll. Nichts ist verloren: gleich noch einmal versuchen.',
+  'form.error.unreachable':
+    'Der Server antwortet nicht. Nichts ist verloren: noch einmal versuchen.',
   'form.loading': 'Grenzen werden gelesen…',
   'form.loading.failed': 'Die Grenzen sind vom Server nicht zu lesen.',
   'form.retry': 'Noch einmal',
@@ -92,7 +99,8 @@ export const de: Strings = {
   'drawing.muscle': 'Muskel',
   'drawing.fat': 'Fett',
   'drawing.seat': 'Sitz',
-  'drawing.text': 'Knochenradien R1 {R1} mm und R2 {R2} mm, Muskel {eM} mm, Fett {eF} mm unter dem Knochen.',
+  'drawing.text':
+    'Knochenradien R1 {R1} mm und R2 {R2} mm, Muskel {eM} mm, Fett {eF} mm unter dem Knochen.',
 
   'result.title': 'Ergebnis',
   'result.title.pair': 'Links und rechts',
@@ -101,7 +109,8 @@ export const de: Strings = {
   'result.measured': 'gemessen {time}',
   'result.computed': 'berechnet {time}',
   'result.loading': 'Auswertung wird gelesen…',
-  'result.lost': 'Der Server antwortet nicht; es wird weiter versucht. Die Auswertung ist dort gesichert.',
+  'result.lost':
+    'Der Server antwortet nicht; es wird weiter versucht. Die Auswertung ist dort gesichert.',
   'result.not_found': 'Diese Auswertung gibt es nicht.',
   'result.queued': 'Wartet auf einen freien Rechenprozess',
   'result.running': 'Wird berechnet',
@@ -146,14 +155,19 @@ export const de: Strings = {
   'glance.axis.depth': 'technische Dehnung, {depth} mm unter dem Knochen',
 
   'caveat.title': 'Was das nicht sagt',
-  'caveat.animal': 'Die Schwellen stammen aus Tierversuchen. Eine zu überschreiten ist keine Wahrscheinlichkeit einer Verletzung.',
-  'caveat.high': 'Dieses lokale Modell liest höher als ein vollständiges Modell derselben Person (0,5 RMS im Artikel): es ordnet, es stellt keine Diagnose.',
-  'caveat.measures': 'ε max ist technische Dehnung; die Schwellen gelten für Green–Lagrange-Dehnung. Nie das eine mit dem anderen vergleichen.',
+  'caveat.animal':
+    'Die Schwellen stammen aus Tierversuchen. Eine zu überschreiten ist keine Wahrscheinlichkeit einer Verletzung.',
+  'caveat.high':
+    'Dieses lokale Modell liest höher als ein vollständiges Modell derselben Person (0,5 RMS im Artikel): es ordnet, es stellt keine Diagnose.',
+  'caveat.measures':
+    'ε max ist technische Dehnung; die Schwellen gelten für Green–Lagrange-Dehnung. Nie das eine mit dem anderen vergleichen.',
   'caveat.device': 'Kein Medizinprodukt.',
-  'caveat.studied': '{side}: {key} = {value} {unit} liegt außerhalb des im Artikel untersuchten Bereichs ({min} bis {max}).',
+  'caveat.studied':
+    '{side}: {key} = {value} {unit} liegt außerhalb des im Artikel untersuchten Bereichs ({min} bis {max}).',
 
   'curve.title': 'Lastkurve',
-  'curve.alt': 'Lastkurve, {side}: Dehnung im Muskel über der Kraft. Die Tabelle darunter hat die Zahlen.',
+  'curve.alt':
+    'Lastkurve, {side}: Dehnung im Muskel über der Kraft. Die Tabelle darunter hat die Zahlen.',
   'curve.force': 'Kraft auf dieser Seite, N',
   'curve.shear': 'Größtes E Scher im Muskel (Green–Lagrange)',
   'curve.compression': 'Größtes E Komp im Muskel (Green–Lagrange)',
@@ -170,7 +184,8 @@ export const de: Strings = {
   'picture.title': 'Belastetes Gewebe',
   'picture.section': 'Schnitt',
   'picture.3d': '3D',
-  'picture.alt': 'Schnitt durch das belastete Gewebe, {side}, gefärbt nach Green–Lagrange-Scherung, mit der Kontur der Schwelle',
+  'picture.alt':
+    'Schnitt durch das belastete Gewebe, {side}, gefärbt nach Green–Lagrange-Scherung, mit der Kontur der Schwelle',
   'picture.tabs': 'Bild, {side}',
 
   'numbers.title': 'Alle Zahlen',
@@ -206,7 +221,8 @@ export const de: Strings = {
 
   'strip.title': 'Unter den 26 Seiten der Tabelle 2',
   'strip.note': 'Die 13 Personen aus Macron et al. (2020), mit demselben Modell berechnet.',
-  'strip.alt': '{metric} der {n} Vergleichsseiten und dieser Auswertung. Die Tabelle hat die Zahlen.',
+  'strip.alt':
+    '{metric} der {n} Vergleichsseiten und dieser Auswertung. Die Tabelle hat die Zahlen.',
   'strip.eps': 'ε max, technisch',
   'strip.v_shear': 'Muskel über der Scherschwelle, mm³',
   'strip.v_both': 'Muskel über beiden, mm³',
@@ -250,9 +266,11 @@ export const de: Strings = {
   'list.csv': 'Als CSV',
 
   'view.loading': '3D-Ansicht wird geladen…',
-  'view.no_webgl': 'Dieser Browser zeichnet kein 3D (kein WebGL). Der Schnitt zeigt dasselbe Gewebe.',
+  'view.no_webgl':
+    'Dieser Browser zeichnet kein 3D (kein WebGL). Der Schnitt zeigt dasselbe Gewebe.',
   'view.failed': 'Die 3D-Ansicht ist nicht zu zeigen: {detail}',
-  'view.alt': '3D-Ansicht des belasteten Gewebes, {side}. Ziehen dreht, das Rad vergrößert; die Pfeiltasten drehen, Plus und Minus vergrößern und verkleinern.',
+  'view.alt':
+    '3D-Ansicht des belasteten Gewebes, {side}. Ziehen dreht, das Rad vergrößert; die Pfeiltasten drehen, Plus und Minus vergrößern und verkleinern.',
   'view.colour': 'Farbe',
   'view.colour.shear': 'E Scher (Green–Lagrange)',
   'view.colour.comp': 'E Komp (Green–Lagrange)',
@@ -262,7 +280,8 @@ export const de: Strings = {
   'view.seat': 'Sitz',
   'view.load': 'Last',
   'view.load.at': '{force} N · Weg {travel} mm · E Scher {shear} · E Komp {comp}',
-  'view.load.partial': 'Die Zahlen sind berechnet; zwischen null und voller Last ist die Form die Endform, verkleinert auf den berechneten Sitzweg. Farben gibt es nur bei voller Last.',
+  'view.load.partial':
+    'Die Zahlen sind berechnet; zwischen null und voller Last ist die Form die Endform, verkleinert auf den berechneten Sitzweg. Farben gibt es nur bei voller Last.',
   'view.reset': 'Ansicht zurücksetzen',
   'view.screenshot': 'Bild sichern',
   'view.threshold': 'Schwelle {value}',

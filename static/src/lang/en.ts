@@ -19,11 +19,14 @@ export const en = {
   'side.none.short': '–',
 
   'param.R1.name': 'Smaller bone radius',
-  'param.R1.help': 'Radius of curvature of the ischium at its lowest point, in the plane where it is smallest.',
+  'param.R1.help':
+    'Radius of curvature of the ischium at its lowest point, in the plane where it is smallest.',
   'param.R2.name': 'Larger bone radius',
-  'param.R2.help': 'Radius of curvature of the ischium in the plane at right angles to R1. Never smaller than R1.',
+  'param.R2.help':
+    'Radius of curvature of the ischium in the plane at right angles to R1. Never smaller than R1.',
   'param.eM.name': 'Muscle thickness',
-  'param.eM.help': 'Thickness of the muscle under the ischium, unloaded. If you have the total thickness of muscle and fat, choose “total”: eM is then total minus eF.',
+  'param.eM.help':
+    'Thickness of the muscle under the ischium, unloaded. If you have the total thickness of muscle and fat, choose “total”: eM is then total minus eF.',
   'param.eF.name': 'Fat thickness',
   'param.eF.help': 'Thickness of the fat under the ischium, unloaded.',
   'param.muM.name': 'Muscle stiffness',
@@ -31,7 +34,8 @@ export const en = {
   'param.muF.name': 'Fat stiffness',
   'param.muF.help': 'Shear modulus of the fat (Ogden law, exponent 5).',
   'param.F.name': 'Force on this side',
-  'param.F.help': 'Vertical force that the seat carries under this one ischium, sitting: the whole side.',
+  'param.F.help':
+    'Vertical force that the seat carries under this one ischium, sitting: the whole side.',
 
   'form.title': 'New assessment',
   'form.person': 'Person',
@@ -90,7 +94,8 @@ export const en = {
   'drawing.muscle': 'muscle',
   'drawing.fat': 'fat',
   'drawing.seat': 'seat',
-  'drawing.text': 'Bone radii R1 {R1} mm and R2 {R2} mm, muscle {eM} mm, fat {eF} mm under the bone.',
+  'drawing.text':
+    'Bone radii R1 {R1} mm and R2 {R2} mm, muscle {eM} mm, fat {eF} mm under the bone.',
 
   'result.title': 'Result',
   'result.title.pair': 'Left and right',
@@ -144,14 +149,19 @@ export const en = {
   'glance.axis.depth': 'engineering strain, {depth} mm below the bone',
 
   'caveat.title': 'What this does not say',
-  'caveat.animal': 'The thresholds come from animal experiments. Crossing one is not a probability of injury.',
-  'caveat.high': 'This local model reads higher than a full model of the same person (0.5 RMS in the paper): it ranks, it does not diagnose.',
-  'caveat.measures': 'ε max is engineering strain; the thresholds are on Green–Lagrange strain. Never compare one with the other.',
+  'caveat.animal':
+    'The thresholds come from animal experiments. Crossing one is not a probability of injury.',
+  'caveat.high':
+    'This local model reads higher than a full model of the same person (0.5 RMS in the paper): it ranks, it does not diagnose.',
+  'caveat.measures':
+    'ε max is engineering strain; the thresholds are on Green–Lagrange strain. Never compare one with the other.',
   'caveat.device': 'Not a medical device.',
-  'caveat.studied': '{side}: {key} = {value} {unit} is outside the range studied in the paper ({min} to {max}).',
+  'caveat.studied':
+    '{side}: {key} = {value} {unit} is outside the range studied in the paper ({min} to {max}).',
 
   'curve.title': 'Load curve',
-  'curve.alt': 'Load curve, {side}: strain in the muscle against the force. The table below has the numbers.',
+  'curve.alt':
+    'Load curve, {side}: strain in the muscle against the force. The table below has the numbers.',
   'curve.force': 'force on this side, N',
   'curve.shear': 'Largest E shear in muscle (Green–Lagrange)',
   'curve.compression': 'Largest E comp in muscle (Green–Lagrange)',
@@ -168,7 +178,8 @@ export const en = {
   'picture.title': 'Loaded tissue',
   'picture.section': 'Section',
   'picture.3d': '3-D',
-  'picture.alt': 'Section of the loaded tissue, {side}, coloured by Green–Lagrange shear strain, with the threshold contour',
+  'picture.alt':
+    'Section of the loaded tissue, {side}, coloured by Green–Lagrange shear strain, with the threshold contour',
   'picture.tabs': 'Picture, {side}',
 
   'numbers.title': 'All numbers',
@@ -204,7 +215,8 @@ export const en = {
 
   'strip.title': 'Against the 26 sides of Table 2',
   'strip.note': 'The 13 persons of Macron et al. (2020), computed with this same model.',
-  'strip.alt': '{metric} of the {n} reference sides and of this assessment. The table has the numbers.',
+  'strip.alt':
+    '{metric} of the {n} reference sides and of this assessment. The table has the numbers.',
   'strip.eps': 'ε max, engineering',
   'strip.v_shear': 'Muscle over shear threshold, mm³',
   'strip.v_both': 'Muscle over both, mm³',
@@ -250,7 +262,8 @@ export const en = {
   'view.loading': 'Loading the 3-D view…',
   'view.no_webgl': 'This browser cannot draw 3-D (no WebGL). The section shows the same tissue.',
   'view.failed': 'The 3-D view could not be shown: {detail}',
-  'view.alt': '3-D view of the loaded tissue, {side}. Drag to turn, wheel to zoom; the arrow keys turn it, plus and minus zoom.',
+  'view.alt':
+    '3-D view of the loaded tissue, {side}. Drag to turn, wheel to zoom; the arrow keys turn it, plus and minus zoom.',
   'view.colour': 'Colour',
   'view.colour.shear': 'E shear (Green–Lagrange)',
   'view.colour.comp': 'E comp (Green–Lagrange)',
@@ -260,7 +273,8 @@ export const en = {
   'view.seat': 'Seat',
   'view.load': 'Load',
   'view.load.at': '{force} N · travel {travel} mm · E shear {shear} · E comp {comp}',
-  'view.load.partial': 'Numbers computed; the shape between none and full load is the final shape scaled to the computed seat travel. Strain colours are shown at full load only.',
+  'view.load.partial':
+    'Numbers computed; the shape between none and full load is the final shape scaled to the computed seat travel. Strain colours are shown at full load only.',
   'view.reset': 'Reset view',
   'view.screenshot': 'Save picture',
   'view.threshold': 'threshold {value}',

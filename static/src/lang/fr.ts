@@ -21,11 +21,14 @@ export const fr: Strings = {
   'side.none.short': '–',
 
   'param.R1.name': 'Petit rayon de l’os',
-  'param.R1.help': 'Rayon de courbure de l’ischion en son point le plus bas, dans le plan où il est le plus petit.',
+  'param.R1.help':
+    'Rayon de courbure de l’ischion en son point le plus bas, dans le plan où il est le plus petit.',
   'param.R2.name': 'Grand rayon de l’os',
-  'param.R2.help': 'Rayon de courbure de l’ischion dans le plan perpendiculaire à R1. Jamais inférieur à R1.',
+  'param.R2.help':
+    'Rayon de courbure de l’ischion dans le plan perpendiculaire à R1. Jamais inférieur à R1.',
   'param.eM.name': 'Épaisseur de muscle',
-  'param.eM.help': 'Épaisseur du muscle sous l’ischion, sans charge. Si vous avez l’épaisseur totale du muscle et de la graisse, cochez « total » : eM est alors le total moins eF.',
+  'param.eM.help':
+    'Épaisseur du muscle sous l’ischion, sans charge. Si vous avez l’épaisseur totale du muscle et de la graisse, cochez « total » : eM est alors le total moins eF.',
   'param.eF.name': 'Épaisseur de graisse',
   'param.eF.help': 'Épaisseur de la graisse sous l’ischion, sans charge.',
   'param.muM.name': 'Raideur du muscle',
@@ -33,13 +36,15 @@ export const fr: Strings = {
   'param.muF.name': 'Raideur de la graisse',
   'param.muF.help': 'Module de cisaillement de la graisse (loi d’Ogden, exposant 5).',
   'param.F.name': 'Force de ce côté',
-  'param.F.help': 'Force verticale que l’assise porte sous ce seul ischion, en position assise : le côté entier.',
+  'param.F.help':
+    'Force verticale que l’assise porte sous ce seul ischion, en position assise : le côté entier.',
 
   'form.title': 'Nouvelle évaluation',
   'form.person': 'Personne',
   'form.subject': 'Code du sujet',
   'form.subject.hint': 'Un pseudonyme, jamais un nom',
-  'form.subject.fault': 'Lettres sans accent, chiffres, « . », « _ » et « - » seulement, 64 au plus.',
+  'form.subject.fault':
+    'Lettres sans accent, chiffres, « . », « _ » et « - » seulement, 64 au plus.',
   'form.measured_at': 'Mesuré le',
   'form.resolution': 'Résolution',
   'form.resolution.standard': 'Standard',
@@ -47,7 +52,8 @@ export const fr: Strings = {
   'form.sample': 'Personne exemple',
   'form.sample.option': 'Tableau 2, sujet {n}',
   'form.sample.fill': 'Remplir',
-  'form.sample.filled': 'Les deux côtés sont remplis avec le sujet {n} du tableau 2 (Macron et al. 2020).',
+  'form.sample.filled':
+    'Les deux côtés sont remplis avec le sujet {n} du tableau 2 (Macron et al. 2020).',
   'form.clear': 'Effacer',
   'form.copy': 'Copier les raideurs de l’autre côté',
   'form.total': 'total',
@@ -92,7 +98,8 @@ export const fr: Strings = {
   'drawing.muscle': 'muscle',
   'drawing.fat': 'graisse',
   'drawing.seat': 'assise',
-  'drawing.text': 'Rayons de l’os R1 {R1} mm et R2 {R2} mm, muscle {eM} mm, graisse {eF} mm sous l’os.',
+  'drawing.text':
+    'Rayons de l’os R1 {R1} mm et R2 {R2} mm, muscle {eM} mm, graisse {eF} mm sous l’os.',
 
   'result.title': 'Résultat',
   'result.title.pair': 'Gauche et droite',
@@ -146,14 +153,19 @@ export const fr: Strings = {
   'glance.axis.depth': 'déformation de l’ingénieur, {depth} mm sous l’os',
 
   'caveat.title': 'Ce que cela ne dit pas',
-  'caveat.animal': 'Les seuils proviennent d’essais sur l’animal. En franchir un n’est pas une probabilité de lésion.',
-  'caveat.high': 'Ce modèle local donne des valeurs plus élevées qu’un modèle complet de la même personne (0,5 RMS dans l’article) : il classe, il ne diagnostique pas.',
-  'caveat.measures': 'ε max est une déformation de l’ingénieur ; les seuils portent sur la déformation de Green–Lagrange. Ne comparez jamais l’une à l’autre.',
+  'caveat.animal':
+    'Les seuils proviennent d’essais sur l’animal. En franchir un n’est pas une probabilité de lésion.',
+  'caveat.high':
+    'Ce modèle local donne des valeurs plus élevées qu’un modèle complet de la même personne (0,5 RMS dans l’article) : il classe, il ne diagnostique pas.',
+  'caveat.measures':
+    'ε max est une déformation de l’ingénieur ; les seuils portent sur la déformation de Green–Lagrange. Ne comparez jamais l’une à l’autre.',
   'caveat.device': 'N’est pas un dispositif médical.',
-  'caveat.studied': '{side} : {key} = {value} {unit} est hors du domaine étudié dans l’article ({min} à {max}).',
+  'caveat.studied':
+    '{side} : {key} = {value} {unit} est hors du domaine étudié dans l’article ({min} à {max}).',
 
   'curve.title': 'Courbe de charge',
-  'curve.alt': 'Courbe de charge, {side} : déformation dans le muscle en fonction de la force. Le tableau ci-dessous donne les nombres.',
+  'curve.alt':
+    'Courbe de charge, {side} : déformation dans le muscle en fonction de la force. Le tableau ci-dessous donne les nombres.',
   'curve.force': 'force de ce côté, N',
   'curve.shear': 'Plus grand E cis. dans le muscle (Green–Lagrange)',
   'curve.compression': 'Plus grand E comp. dans le muscle (Green–Lagrange)',
@@ -170,7 +182,8 @@ export const fr: Strings = {
   'picture.title': 'Tissu chargé',
   'picture.section': 'Coupe',
   'picture.3d': '3D',
-  'picture.alt': 'Coupe du tissu chargé, {side}, colorée selon le cisaillement de Green–Lagrange, avec le contour du seuil',
+  'picture.alt':
+    'Coupe du tissu chargé, {side}, colorée selon le cisaillement de Green–Lagrange, avec le contour du seuil',
   'picture.tabs': 'Image, {side}',
 
   'numbers.title': 'Tous les nombres',
@@ -206,7 +219,8 @@ export const fr: Strings = {
 
   'strip.title': 'Parmi les 26 côtés du tableau 2',
   'strip.note': 'Les 13 personnes de Macron et al. (2020), calculées avec ce même modèle.',
-  'strip.alt': '{metric} des {n} côtés de référence et de cette évaluation. Le tableau donne les nombres.',
+  'strip.alt':
+    '{metric} des {n} côtés de référence et de cette évaluation. Le tableau donne les nombres.',
   'strip.eps': 'ε max, ingénieur',
   'strip.v_shear': 'Muscle au-dessus du seuil de cisaillement, mm³',
   'strip.v_both': 'Muscle au-dessus des deux, mm³',
@@ -250,9 +264,11 @@ export const fr: Strings = {
   'list.csv': 'En CSV',
 
   'view.loading': 'Chargement de la vue 3D…',
-  'view.no_webgl': 'Ce navigateur ne dessine pas en 3D (pas de WebGL). La coupe montre le même tissu.',
+  'view.no_webgl':
+    'Ce navigateur ne dessine pas en 3D (pas de WebGL). La coupe montre le même tissu.',
   'view.failed': 'La vue 3D ne peut pas être montrée : {detail}',
-  'view.alt': 'Vue 3D du tissu chargé, {side}. Glisser pour tourner, molette pour agrandir ; les flèches tournent, plus et moins agrandissent et réduisent.',
+  'view.alt':
+    'Vue 3D du tissu chargé, {side}. Glisser pour tourner, molette pour agrandir ; les flèches tournent, plus et moins agrandissent et réduisent.',
   'view.colour': 'Couleur',
   'view.colour.shear': 'E cis. (Green–Lagrange)',
   'view.colour.comp': 'E comp. (Green–Lagrange)',
@@ -262,7 +278,8 @@ export const fr: Strings = {
   'view.seat': 'Assise',
   'view.load': 'Charge',
   'view.load.at': '{force} N · course {travel} mm · E cis. {shear} · E comp. {comp}',
-  'view.load.partial': 'Les nombres sont calculés ; entre zéro et la pleine charge, la forme est la forme finale réduite à la course calculée de l’assise. Les couleurs ne sont montrées qu’à pleine charge.',
+  'view.load.partial':
+    'Les nombres sont calculés ; entre zéro et la pleine charge, la forme est la forme finale réduite à la course calculée de l’assise. Les couleurs ne sont montrées qu’à pleine charge.',
   'view.reset': 'Vue initiale',
   'view.screenshot': 'Enregistrer l’image',
   'view.threshold': 'seuil {value}',

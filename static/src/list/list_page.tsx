@@ -55,7 +55,13 @@ function FilterForm(props: { query: URLSearchParams }) {
     <form class="filter" onSubmit={apply} key={query.toString()} aria-label={t('list.filter')}>
       <div class="item">
         <label for="f-subject">{t('list.subject')}</label>
-        <input id="f-subject" name="subject" type="text" autoComplete="off" defaultValue={query.get('subject') ?? ''} />
+        <input
+          id="f-subject"
+          name="subject"
+          type="text"
+          autoComplete="off"
+          defaultValue={query.get('subject') ?? ''}
+        />
       </div>
       <div class="item">
         <label for="f-side">{t('list.side')}</label>
@@ -70,7 +76,9 @@ function FilterForm(props: { query: URLSearchParams }) {
         <select id="f-status" name="status" defaultValue={query.get('status') ?? ''}>
           <option value="">{t('list.any')}</option>
           {statuses.map((s) => (
-            <option key={s} value={s}>{t(`status.${s}`)}</option>
+            <option key={s} value={s}>
+              {t(`status.${s}`)}
+            </option>
           ))}
         </select>
       </div>
@@ -87,15 +95,27 @@ function Row(props: { of: Assessment; selected: boolean; full: boolean; on_selec
   return (
     <tr class={selected ? 'ours' : ''}>
       <td class="text">
-        <input type="checkbox" checked={selected} disabled={full && !selected} aria-label={name} onChange={props.on_select} />
+        <input
+          type="checkbox"
+          checked={selected}
+          disabled={full && !selected}
+          aria-label={name}
+          onChange={props.on_select}
+        />
       </td>
-      <th scope="row" class="text"><Link to={result_address([of.id])}>{time}</Link></th>
+      <th scope="row" class="text">
+        <Link to={result_address([of.id])}>{time}</Link>
+      </th>
       <td class="text">{of.subject ?? '–'}</td>
       <td class="text">{side_name(of.side)}</td>
-      <td class="text"><Outcome of={of} /></td>
+      <td class="text">
+        <Outcome of={of} />
+      </td>
       <td>{result ? format_fixed(result.strain.eps_max, 3) : '–'}</td>
       <td>{result ? format_fixed(result.clusters.both.volume_mm3, 0) : '–'}</td>
-      <td class="text inputs">{inputs.map((key) => `${key} ${format(of.parameters[key] ?? NaN)}`).join(', ')}</td>
+      <td class="text inputs">
+        {inputs.map((key) => `${key} ${format(of.parameters[key] ?? NaN)}`).join(', ')}
+      </td>
     </tr>
   );
 }
@@ -107,14 +127,26 @@ function Rows(props: { items: Assessment[]; selected: string[]; on_select: (id: 
       <table class="numbers list">
         <thead>
           <tr>
-            <th scope="col" class="text">{t('list.col.select')}</th>
-            <th scope="col" class="text">{t('list.col.time')}</th>
-            <th scope="col" class="text">{t('list.col.subject')}</th>
-            <th scope="col" class="text">{t('list.col.side')}</th>
-            <th scope="col" class="text">{t('list.col.outcome')}</th>
+            <th scope="col" class="text">
+              {t('list.col.select')}
+            </th>
+            <th scope="col" class="text">
+              {t('list.col.time')}
+            </th>
+            <th scope="col" class="text">
+              {t('list.col.subject')}
+            </th>
+            <th scope="col" class="text">
+              {t('list.col.side')}
+            </th>
+            <th scope="col" class="text">
+              {t('list.col.outcome')}
+            </th>
             <th scope="col">{t('list.col.eps')}</th>
             <th scope="col">{t('list.col.both')}</th>
-            <th scope="col" class="text">{t('list.col.inputs')}</th>
+            <th scope="col" class="text">
+              {t('list.col.inputs')}
+            </th>
           </tr>
         </thead>
         <tbody>
@@ -151,7 +183,9 @@ export function ListPage(props: { query: URLSearchParams }) {
   const [page, fault, fail] = use_page(props.query);
   const [selected, set_selected] = useState<string[]>([]);
   const toggle = (id: string): void =>
-    set_selected((now) => (now.includes(id) ? now.filter((s) => s !== id) : [...now, id].slice(0, 2)));
+    set_selected((now) =>
+      now.includes(id) ? now.filter((s) => s !== id) : [...now, id].slice(0, 2),
+    );
   const save_csv = (): void => {
     list_as_csv(filter_of(props.query)).then((blob) => save_file(blob, 'assessments.csv'), fail);
   };
@@ -163,18 +197,31 @@ export function ListPage(props: { query: URLSearchParams }) {
       <h1 tabIndex={-1}>{t('list.title')}</h1>
       <div class="list-bar">
         <FilterForm query={props.query} />
-        <button type="button" onClick={save_csv}>{t('list.csv')}</button>
+        <button type="button" onClick={save_csv}>
+          {t('list.csv')}
+        </button>
         <div class="compare">
-          <button type="button" class="primary" aria-disabled={selected.length !== 2} onClick={compare}>
+          <button
+            type="button"
+            class="primary"
+            aria-disabled={selected.length !== 2}
+            onClick={compare}
+          >
             {t('list.compare')}
           </button>
           <span class="hint">{selected.length === 2 ? '' : t('list.compare.hint')}</span>
         </div>
       </div>
-      {fault && <p class="errors" role="alert">{fault}</p>}
+      {fault && (
+        <p class="errors" role="alert">
+          {fault}
+        </p>
+      )}
       {!page && !fault && <p class="loading">{t('list.loading')}</p>}
       {page?.items.length === 0 && <p class="hint">{t('list.empty')}</p>}
-      {page && page.items.length > 0 && <Rows items={page.items} selected={selected} on_select={toggle} />}
+      {page && page.items.length > 0 && (
+        <Rows items={page.items} selected={selected} on_select={toggle} />
+      )}
       {page && <Pager query={props.query} page={page} />}
     </div>
   );

@@ -19,7 +19,9 @@ function Inputs(props: { of: Finished; parameters: Parameters }) {
         {props.parameters.inputs.map((info) => (
           <tr key={info.key}>
             <th scope="row">{param_name(info)}</th>
-            <td><Symbol_ of={info.key} /></td>
+            <td>
+              <Symbol_ of={info.key} />
+            </td>
             <td class="n">{format(props.of.parameters[info.key] ?? NaN)}</td>
             <td>{info.unit}</td>
           </tr>
@@ -35,11 +37,24 @@ function Strain(props: { of: Finished }) {
   const threshold = (set: ClusterSet): string =>
     t('curve.threshold', { value: set.threshold ?? '' });
   const rows: [string, string, string, string][] = [
-    ['ε max', t('report.engineering'),
+    [
+      'ε max',
+      t('report.engineering'),
       `${format_fixed(strain.eps_max, 3)} ± ${format_fixed(numerics.eps_max_error, 3)}`,
-      t('report.depth', { depth })],
-    ['E shear', t('report.green_lagrange'), format_fixed(strain.E_shear_max, 3), threshold(clusters.shear)],
-    ['E comp', t('report.green_lagrange'), format_fixed(strain.E_comp_max, 3), threshold(clusters.compression)],
+      t('report.depth', { depth }),
+    ],
+    [
+      'E shear',
+      t('report.green_lagrange'),
+      format_fixed(strain.E_shear_max, 3),
+      threshold(clusters.shear),
+    ],
+    [
+      'E comp',
+      t('report.green_lagrange'),
+      format_fixed(strain.E_comp_max, 3),
+      threshold(clusters.compression),
+    ],
     [t('numbers.travel'), '', `${format_fixed(seat.displacement_mm, 1)} mm`, ''],
     [t('numbers.peak_pressure'), '', `${format_fixed(seat.peak_pressure_kPa, 1)} kPa`, ''],
   ];
@@ -49,7 +64,9 @@ function Strain(props: { of: Finished }) {
       <tbody>
         {rows.map(([name, measure, value, note]) => (
           <tr key={name}>
-            <th scope="row" colSpan={measure ? 1 : 2}>{name}</th>
+            <th scope="row" colSpan={measure ? 1 : 2}>
+              {name}
+            </th>
             {measure && <td>{measure}</td>}
             <td class="n">{value}</td>
             <td>{note}</td>
@@ -69,7 +86,11 @@ function Clusters(props: { of: Finished }) {
   };
   const rows: [string, ClusterSet, number | null | undefined][] = [
     [t('glance.shear', { threshold: clusters.shear.threshold ?? '' }), clusters.shear, force.shear],
-    [t('glance.compression', { threshold: clusters.compression.threshold ?? '' }), clusters.compression, force.compression],
+    [
+      t('glance.compression', { threshold: clusters.compression.threshold ?? '' }),
+      clusters.compression,
+      force.compression,
+    ],
     [t('glance.both'), clusters.both, undefined],
   ];
   return (
@@ -78,10 +99,19 @@ function Clusters(props: { of: Finished }) {
       <thead>
         <tr>
           <th scope="col">{t('report.criterion')}</th>
-          <th scope="col" class="n">{t('report.volume')}</th>
-          <th scope="col" class="n">{t('report.share')}</th>
-          <th scope="col" class="n">{t('report.count')}</th>
-          <th scope="col" class="n">{`${t('report.first_at')} (F = ${format(parameters['F'] ?? NaN)} N)`}</th>
+          <th scope="col" class="n">
+            {t('report.volume')}
+          </th>
+          <th scope="col" class="n">
+            {t('report.share')}
+          </th>
+          <th scope="col" class="n">
+            {t('report.count')}
+          </th>
+          <th
+            scope="col"
+            class="n"
+          >{`${t('report.first_at')} (F = ${format(parameters['F'] ?? NaN)} N)`}</th>
         </tr>
       </thead>
       <tbody>
@@ -118,7 +148,9 @@ function Report(props: { of: Finished; name: string; parameters: Parameters; ver
             of.subject && t('result.subject', { subject: of.subject }),
             of.label,
             of.measured_at && t('result.measured', { time: format_time(of.measured_at) }),
-          ].filter(Boolean).join(' · ')}
+          ]
+            .filter(Boolean)
+            .join(' · ')}
         </p>
       </header>
       <p class="verdict">
@@ -135,7 +167,11 @@ function Report(props: { of: Finished; name: string; parameters: Parameters; ver
       </figure>
       <section class="limits">
         <h3>{t('report.caveats')}</h3>
-        <ul>{caveats.map((text) => <li key={text}>{text}</li>)}</ul>
+        <ul>
+          {caveats.map((text) => (
+            <li key={text}>{text}</li>
+          ))}
+        </ul>
       </section>
       <footer>
         <p class="ids">
@@ -145,7 +181,9 @@ function Report(props: { of: Finished; name: string; parameters: Parameters; ver
             `${t('report.id')} ${of.id}`,
             `${t('report.created')} ${format_time(of.created_at)}`,
             t('report.printed', { time: format_time(new Date().toISOString()) }),
-          ].filter(Boolean).join(' · ')}
+          ]
+            .filter(Boolean)
+            .join(' · ')}
         </p>
         <p class="signature">{t('report.signature')}</p>
       </footer>
@@ -162,7 +200,13 @@ export function Reports(props: { documents: Finished[]; parameters: Parameters }
   return (
     <div class="reports">
       {props.documents.map((d, i) => (
-        <Report key={d.id} of={d} name={names[i] ?? ''} parameters={props.parameters} version={version} />
+        <Report
+          key={d.id}
+          of={d}
+          name={names[i] ?? ''}
+          parameters={props.parameters}
+          version={version}
+        />
       ))}
     </div>
   );

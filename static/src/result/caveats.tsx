@@ -6,7 +6,12 @@ import type { Assessment, FieldError, ParameterInfo } from '../types.js';
 import { column_names, Shape } from '../ui.js';
 
 /* Warnings of the daemon in the reader's language; one this page does not know is shown as sent. */
-export function warning_text(w: FieldError, d: Assessment, name: string, inputs: ParameterInfo[]): string {
+export function warning_text(
+  w: FieldError,
+  d: Assessment,
+  name: string,
+  inputs: ParameterInfo[],
+): string {
   const key = w.pointer.replace(/^\//, '');
   const info = inputs.find((i) => i.key === key);
   const value = d.parameters[key];
@@ -29,7 +34,10 @@ export function Caveats(props: { documents: Assessment[]; inputs: ParameterInfo[
       <h2 id="caveats">{t('caveat.title')}</h2>
       <ul>
         {warnings.map((text) => (
-          <li key={text} class="warning"><Shape of="shear" />{text}</li>
+          <li key={text} class="warning">
+            <Shape of="shear" />
+            {text}
+          </li>
         ))}
         {general_caveats().map((text) => (
           <li key={text}>{text}</li>

@@ -40,7 +40,9 @@ function Mark(props: { x: number; y: number; of: Finished; current: boolean }) {
   return (
     <g class={`mark ${of.side ?? ''} ${current ? 'current' : ''}`}>
       <path d={shape} />
-      <text x={x} y={y - 8} text-anchor="middle">{side_letter(of.side)}</text>
+      <text x={x} y={y - 8} text-anchor="middle">
+        {side_letter(of.side)}
+      </text>
     </g>
   );
 }
@@ -56,17 +58,32 @@ function Chart(props: { items: Finished[]; current: string[] }) {
     size.left + 10 + ((time - first) / (last - first)) * (size.width - size.left - size.right - 20);
   const y = (v: number): number => bottom - (v / max) * (bottom - size.top);
   return (
-    <svg class="history" viewBox={`0 0 ${size.width} ${size.height}`} role="img" aria-label={t('history.alt')}>
+    <svg
+      class="history"
+      viewBox={`0 0 ${size.width} ${size.height}`}
+      role="img"
+      aria-label={t('history.alt')}
+    >
       {ticks(max, 3).map((v) => (
         <g key={v}>
           <path class="grid" d={`M${size.left} ${y(v)}H${size.width - size.right}`} />
-          <text class="tick" x={size.left - 5} y={y(v) + 4} text-anchor="end">{format_fixed(v, 1)}</text>
+          <text class="tick" x={size.left - 5} y={y(v) + 4} text-anchor="end">
+            {format_fixed(v, 1)}
+          </text>
         </g>
       ))}
       {items.map((d, i) => (
-        <Mark key={d.id} x={x(times[i] ?? 0)} y={y(d.result.strain.eps_max)} of={d} current={current.includes(d.id)} />
+        <Mark
+          key={d.id}
+          x={x(times[i] ?? 0)}
+          y={y(d.result.strain.eps_max)}
+          of={d}
+          current={current.includes(d.id)}
+        />
       ))}
-      <text class="tick" x={size.left} y={size.height - 4}>{format_time(new Date(first).toISOString().slice(0, 10))}</text>
+      <text class="tick" x={size.left} y={size.height - 4}>
+        {format_time(new Date(first).toISOString().slice(0, 10))}
+      </text>
       <text class="tick" x={size.width - size.right} y={size.height - 4} text-anchor="end">
         {format_time(new Date(last).toISOString().slice(0, 10))}
       </text>
@@ -86,7 +103,9 @@ function Row(props: { of: Assessment; current: boolean }) {
         )}
       </th>
       <td class="text">{side_name(of.side)}</td>
-      <td class="text"><Outcome of={of} /></td>
+      <td class="text">
+        <Outcome of={of} />
+      </td>
       <td>{of.result?.strain ? format_fixed(of.result.strain.eps_max, 3) : '–'}</td>
     </tr>
   );
@@ -113,8 +132,12 @@ export function History(props: { documents: Assessment[] }) {
               <thead>
                 <tr>
                   <th scope="col">{t('history.when')}</th>
-                  <th scope="col" class="text">{t('list.side')}</th>
-                  <th scope="col" class="text">{t('list.col.outcome')}</th>
+                  <th scope="col" class="text">
+                    {t('list.side')}
+                  </th>
+                  <th scope="col" class="text">
+                    {t('list.col.outcome')}
+                  </th>
                   <th scope="col">{t('list.col.eps')}</th>
                 </tr>
               </thead>

@@ -21,16 +21,31 @@ interface Panel {
 function panels(r: Result): Panel[] {
   const { shear, compression } = r.clusters;
   return [
-    { name: t('curve.shear'), class: 'shear', of: (p) => p.E_shear_max,
-      threshold: shear.threshold ?? 0, crossed: r.threshold_force_N.shear },
-    { name: t('curve.compression'), class: 'compression', of: (p) => p.E_comp_max,
-      threshold: compression.threshold ?? 0, crossed: r.threshold_force_N.compression },
+    {
+      name: t('curve.shear'),
+      class: 'shear',
+      of: (p) => p.E_shear_max,
+      threshold: shear.threshold ?? 0,
+      crossed: r.threshold_force_N.shear,
+    },
+    {
+      name: t('curve.compression'),
+      class: 'compression',
+      of: (p) => p.E_comp_max,
+      threshold: compression.threshold ?? 0,
+      crossed: r.threshold_force_N.compression,
+    },
   ];
 }
 
 const panel_top = (i: number): number => plot.top + i * (plot.height + plot.gap);
 
-function PanelPlot(props: { panel: Panel; points: LoadPoint[]; index: number; x: (F: number) => number }) {
+function PanelPlot(props: {
+  panel: Panel;
+  points: LoadPoint[];
+  index: number;
+  x: (F: number) => number;
+}) {
   const { panel, points, index, x } = props;
   const max = Math.max(panel.threshold * 1.2, ...points.map(panel.of)) * 1.05;
   const top = panel_top(index);
@@ -41,11 +56,15 @@ function PanelPlot(props: { panel: Panel; points: LoadPoint[]; index: number; x:
   const latest = 0.8 * (points[points.length - 1]?.F_N ?? 0); /* a label after it would not fit */
   return (
     <g class={`panel ${panel.class}`}>
-      <text class="name" x={plot.left} y={top - 6}>{panel.name}</text>
+      <text class="name" x={plot.left} y={top - 6}>
+        {panel.name}
+      </text>
       {ticks(max, 3).map((v) => (
         <g key={v}>
           <path class="grid" d={`M${plot.left} ${y(v)}H${width - plot.right}`} />
-          <text class="tick" x={plot.left - 5} y={y(v) + 4} text-anchor="end">{format(v)}</text>
+          <text class="tick" x={plot.left - 5} y={y(v) + 4} text-anchor="end">
+            {format(v)}
+          </text>
         </g>
       ))}
       <path class="threshold" d={`M${plot.left} ${y_threshold}H${width - plot.right}`} />
@@ -107,14 +126,17 @@ export function LoadCurve(props: { of: Finished; side: string }) {
   const points = result.load_curve;
   if (points.length < 2) return null;
   const F = parameters['F'] ?? points[points.length - 1]?.F_N ?? 1;
-  const x = (force: number): number =>
-    plot.left + (force / F) * (width - plot.left - plot.right);
+  const x = (force: number): number => plot.left + (force / F) * (width - plot.left - plot.right);
   const bottom = panel_top(1) + plot.height;
   const height = bottom + plot.foot;
   return (
     <figure class="curve">
       <figcaption>{t('curve.title')}</figcaption>
-      <svg viewBox={`0 0 ${width} ${height}`} role="img" aria-label={t('curve.alt', { side: props.side })}>
+      <svg
+        viewBox={`0 0 ${width} ${height}`}
+        role="img"
+        aria-label={t('curve.alt', { side: props.side })}
+      >
         {panels(result).map((panel, i) => (
           <PanelPlot key={panel.class} panel={panel} points={points} index={i} x={x} />
         ))}
@@ -123,8 +145,12 @@ export function LoadCurve(props: { of: Finished; side: string }) {
             {format(force)}
           </text>
         ))}
-        <text class="tick end" x={x(F)} y={bottom + 14} text-anchor="end">{format(F)}</text>
-        <text class="name" x={plot.left} y={bottom + 29}>{t('curve.force')}</text>
+        <text class="tick end" x={x(F)} y={bottom + 14} text-anchor="end">
+          {format(F)}
+        </text>
+        <text class="name" x={plot.left} y={bottom + 29}>
+          {t('curve.force')}
+        </text>
         <text class="name" x={width - plot.right} y={bottom + 29} text-anchor="end">
           {t('curve.measured', { F })}
         </text>

@@ -10,9 +10,14 @@ import { quantities, quantity_name, type Finished, type Quantity } from './quant
 const unit_suffix = (unit: string): string => (unit ? `\u00a0${unit}` : '');
 
 /* Decimals of a number as it was entered. */
-const decimals_of = (value: number | undefined): number => String(value ?? '').split('.')[1]?.length ?? 0;
+const decimals_of = (value: number | undefined): number =>
+  String(value ?? '').split('.')[1]?.length ?? 0;
 
-function difference_text(a: number | null | undefined, b: number | null | undefined, decimals: number): string {
+function difference_text(
+  a: number | null | undefined,
+  b: number | null | undefined,
+  decimals: number,
+): string {
   return typeof a === 'number' && typeof b === 'number' ? format_signed(b - a, decimals) : '–';
 }
 
@@ -24,11 +29,17 @@ function InputRows(props: { documents: Assessment[]; inputs: ParameterInfo[] }) 
         const values = documents.map((d) => d.parameters[info.key]);
         return (
           <tr key={info.key}>
-            <th scope="row"><Symbol_ of={info.key} /> {param_name(info)}</th>
+            <th scope="row">
+              <Symbol_ of={info.key} /> {param_name(info)}
+            </th>
             {values.map((v, i) => (
               <td key={i}>{v === undefined ? '–' : format(v) + unit_suffix(info.unit)}</td>
             ))}
-            {documents.length === 2 && <td class="difference">{difference_text(values[0], values[1], Math.max(...values.map(decimals_of)))}</td>}
+            {documents.length === 2 && (
+              <td class="difference">
+                {difference_text(values[0], values[1], Math.max(...values.map(decimals_of)))}
+              </td>
+            )}
           </tr>
         );
       })}
@@ -52,7 +63,9 @@ function ResultRow(props: { q: Quantity; documents: Finished[] }) {
       {values.map((v, i) => (
         <td key={i}>{cell(q, v)}</td>
       ))}
-      {documents.length === 2 && <td class="difference">{difference_text(values[0], values[1], q.decimals)}</td>}
+      {documents.length === 2 && (
+        <td class="difference">{difference_text(values[0], values[1], q.decimals)}</td>
+      )}
     </tr>
   );
 }
@@ -60,7 +73,9 @@ function ResultRow(props: { q: Quantity; documents: Finished[] }) {
 function Heading(props: { text: string; columns: number }) {
   return (
     <tr class="heading">
-      <th scope="colgroup" colSpan={props.columns}>{props.text}</th>
+      <th scope="colgroup" colSpan={props.columns}>
+        {props.text}
+      </th>
     </tr>
   );
 }
@@ -92,7 +107,9 @@ export function Numbers(props: { documents: Finished[]; inputs: ParameterInfo[] 
             <tr>
               <th scope="col">{t('numbers.metric')}</th>
               {names.map((name) => (
-                <th scope="col" key={name}>{name}</th>
+                <th scope="col" key={name}>
+                  {name}
+                </th>
               ))}
               {documents.length === 2 && <th scope="col">{t('numbers.difference')}</th>}
             </tr>

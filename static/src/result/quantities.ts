@@ -15,21 +15,52 @@ export interface Quantity {
 }
 
 const shear_threshold = (r: Result): Values => ({ threshold: r.clusters.shear.threshold ?? '' });
-const comp_threshold = (r: Result): Values => ({ threshold: r.clusters.compression.threshold ?? '' });
+const comp_threshold = (r: Result): Values => ({
+  threshold: r.clusters.compression.threshold ?? '',
+});
 
 export const quantities: readonly Quantity[] = [
   { key: 'numbers.eps_max', unit: '', decimals: 3, of: (r) => r.strain.eps_max },
   { key: 'numbers.eps_error', unit: '', decimals: 3, of: (r) => r.numerics.eps_max_error },
   { key: 'numbers.eps_depth', unit: 'mm', decimals: 1, of: (r) => r.strain.eps_max_depth_mm },
-  { key: 'numbers.E_shear', values: shear_threshold, unit: '', decimals: 3, of: (r) => r.strain.E_shear_max },
-  { key: 'numbers.E_comp', values: comp_threshold, unit: '', decimals: 3, of: (r) => r.strain.E_comp_max },
+  {
+    key: 'numbers.E_shear',
+    values: shear_threshold,
+    unit: '',
+    decimals: 3,
+    of: (r) => r.strain.E_shear_max,
+  },
+  {
+    key: 'numbers.E_comp',
+    values: comp_threshold,
+    unit: '',
+    decimals: 3,
+    of: (r) => r.strain.E_comp_max,
+  },
   { key: 'numbers.v_shear', unit: 'mm³', decimals: 0, of: (r) => r.clusters.shear.volume_mm3 },
   { key: 'numbers.v_comp', unit: 'mm³', decimals: 0, of: (r) => r.clusters.compression.volume_mm3 },
   { key: 'numbers.v_both', unit: 'mm³', decimals: 0, of: (r) => r.clusters.both.volume_mm3 },
-  { key: 'numbers.v_largest', unit: 'mm³', decimals: 0, of: (r) => r.clusters.both.largest?.volume_mm3 },
+  {
+    key: 'numbers.v_largest',
+    unit: 'mm³',
+    decimals: 0,
+    of: (r) => r.clusters.both.largest?.volume_mm3,
+  },
   { key: 'numbers.muscle', unit: 'mm³', decimals: 0, of: (r) => r.muscle_volume_mm3 },
-  { key: 'numbers.f_shear', unit: 'N', decimals: 0, of: (r) => r.threshold_force_N.shear, absent: 'numbers.never' },
-  { key: 'numbers.f_comp', unit: 'N', decimals: 0, of: (r) => r.threshold_force_N.compression, absent: 'numbers.never' },
+  {
+    key: 'numbers.f_shear',
+    unit: 'N',
+    decimals: 0,
+    of: (r) => r.threshold_force_N.shear,
+    absent: 'numbers.never',
+  },
+  {
+    key: 'numbers.f_comp',
+    unit: 'N',
+    decimals: 0,
+    of: (r) => r.threshold_force_N.compression,
+    absent: 'numbers.never',
+  },
   { key: 'numbers.travel', unit: 'mm', decimals: 1, of: (r) => r.seat.displacement_mm },
   { key: 'numbers.area', unit: 'mm²', decimals: 0, of: (r) => r.seat.contact_area_mm2 },
   { key: 'numbers.mean_pressure', unit: 'kPa', decimals: 1, of: (r) => r.seat.mean_pressure_kPa },

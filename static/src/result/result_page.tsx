@@ -35,7 +35,8 @@ function use_followed(ids: string[]): [Followed[], (index: number) => void] {
   useEffect(() => {
     set(ids.map(() => nothing_yet));
     followers.current = ids.map(
-      (id, i) => new Follower(id, (state) => set((now) => now.map((s, k) => (k === i ? state : s)))),
+      (id, i) =>
+        new Follower(id, (state) => set((now) => now.map((s, k) => (k === i ? state : s)))),
     );
     return () => followers.current.forEach((f) => f.stop());
   }, [ids.join()]);
@@ -80,8 +81,16 @@ function SideCard(props: {
         <h2>{name}</h2>
         {document && <Meta of={document} />}
       </header>
-      {lost && <p class="lost" role="status">{t('result.lost')}</p>}
-      {error && <p class="errors" role="alert">{error.status === 404 ? t('result.not_found') : error.message}</p>}
+      {lost && (
+        <p class="lost" role="status">
+          {t('result.lost')}
+        </p>
+      )}
+      {error && (
+        <p class="errors" role="alert">
+          {error.status === 404 ? t('result.not_found') : error.message}
+        </p>
+      )}
       {busy && <Running state={state} name={name} on_cancelled={props.on_cancelled} />}
       {document && has_ended(document) && !done && <NoResult of={document} />}
       {done && (
@@ -116,8 +125,12 @@ function Files(props: { documents: Assessment[]; names: string[] }) {
         <p key={d.id}>
           <span>{`${props.names[i]}: `}</span>
           <a href={report_path(d.id)}>{t('result.file.report')}</a>
-          <a href={field_path(d.id)} download>{t('result.file.field')}</a>
-          <a href={section_path(d.id)} download>{t('result.file.section')}</a>
+          <a href={field_path(d.id)} download>
+            {t('result.file.field')}
+          </a>
+          <a href={section_path(d.id)} download>
+            {t('result.file.section')}
+          </a>
           <a href={document_path(d.id)}>{t('result.file.document')}</a>
         </p>
       ))}
@@ -148,8 +161,12 @@ export function ResultPage(props: { ids: string[] }) {
         <h1 tabIndex={-1}>{page_title(documents)}</h1>
         {done.length > 0 && (
           <div class="actions">
-            <Link to={form_address(ids)} class="button">{t('result.again')}</Link>
-            <button type="button" class="primary" onClick={() => window.print()}>{t('result.print')}</button>
+            <Link to={form_address(ids)} class="button">
+              {t('result.again')}
+            </Link>
+            <button type="button" class="primary" onClick={() => window.print()}>
+              {t('result.print')}
+            </button>
             <Files documents={done} names={column_names(done)} />
           </div>
         )}

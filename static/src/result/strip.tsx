@@ -17,12 +17,24 @@ interface Metric {
 }
 
 const metrics: readonly Metric[] = [
-  { key: 'strip.eps', decimals: 2,
-    of_reference: (s) => s.eps_max, of_result: (r) => r.strain.eps_max },
-  { key: 'strip.v_shear', decimals: 0,
-    of_reference: (s) => s.volume_shear_mm3, of_result: (r) => r.clusters.shear.volume_mm3 },
-  { key: 'strip.v_both', decimals: 0,
-    of_reference: (s) => s.volume_both_mm3, of_result: (r) => r.clusters.both.volume_mm3 },
+  {
+    key: 'strip.eps',
+    decimals: 2,
+    of_reference: (s) => s.eps_max,
+    of_result: (r) => r.strain.eps_max,
+  },
+  {
+    key: 'strip.v_shear',
+    decimals: 0,
+    of_reference: (s) => s.volume_shear_mm3,
+    of_result: (r) => r.clusters.shear.volume_mm3,
+  },
+  {
+    key: 'strip.v_both',
+    decimals: 0,
+    of_reference: (s) => s.volume_both_mm3,
+    of_result: (r) => r.clusters.both.volume_mm3,
+  },
 ];
 
 const width = 460;
@@ -40,7 +52,9 @@ function Strip(props: { metric: Metric; reference: number[]; ours: number[]; let
       {ticks(max, 5).map((v) => (
         <g key={v}>
           <path class="axis" d={`M${x(v)} ${line_y + 8}v4`} />
-          <text class="tick" x={x(v)} y={line_y + 24} text-anchor="middle">{format(v)}</text>
+          <text class="tick" x={x(v)} y={line_y + 24} text-anchor="middle">
+            {format(v)}
+          </text>
         </g>
       ))}
       {reference.map((v, i) => (
@@ -74,7 +88,12 @@ function Row(props: { metric: Metric; sides: ReferenceSide[]; documents: Finishe
   return (
     <div class="strip-row">
       <h3>{t(metric.key)}</h3>
-      <Strip metric={metric} reference={reference} ours={ours} letters={column_letters(documents)} />
+      <Strip
+        metric={metric}
+        reference={reference}
+        ours={ours}
+        letters={column_letters(documents)}
+      />
       <table class="numbers small">
         <thead>
           <tr>
@@ -88,13 +107,20 @@ function Row(props: { metric: Metric; sides: ReferenceSide[]; documents: Finishe
             <tr key={i} class="ours">
               <th scope="row">{names[i]}</th>
               <td>{number(v)}</td>
-              <td>{t('strip.rank.of', { below: reference.filter((r) => r < v).length, n: sides.length })}</td>
+              <td>
+                {t('strip.rank.of', {
+                  below: reference.filter((r) => r < v).length,
+                  n: sides.length,
+                })}
+              </td>
             </tr>
           ))}
           <tr>
             <th scope="row">{`${t('strip.low')} · ${t('strip.median')} · ${t('strip.high')}`}</th>
             <td colSpan={2}>
-              {[sorted[0] ?? 0, median(sorted), sorted[sorted.length - 1] ?? 0].map(number).join(' · ')}
+              {[sorted[0] ?? 0, median(sorted), sorted[sorted.length - 1] ?? 0]
+                .map(number)
+                .join(' · ')}
             </td>
           </tr>
         </tbody>
@@ -112,7 +138,9 @@ function All(props: { sides: ReferenceSide[] }) {
           <tr>
             <th scope="col">{t('strip.side')}</th>
             {metrics.map((m) => (
-              <th scope="col" key={m.key}>{t(m.key)}</th>
+              <th scope="col" key={m.key}>
+                {t(m.key)}
+              </th>
             ))}
           </tr>
         </thead>

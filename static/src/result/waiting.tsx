@@ -27,7 +27,9 @@ export function Running(props: { state: Followed; name: string; on_cancelled: ()
     <div class="running">
       <p>{progress_text(state)}</p>
       <progress max={1} value={fraction} aria-label={t('result.progress', { side: name })} />
-      <button type="button" onClick={stop}>{t('result.cancel')}</button>
+      <button type="button" onClick={stop}>
+        {t('result.cancel')}
+      </button>
     </div>
   );
 }
@@ -42,7 +44,11 @@ export function NoResult(props: { of: Assessment }) {
         <strong>{t(cancelled ? 'result.cancelled' : 'result.failed')}</strong>
       </p>
       <p>{t(cancelled ? 'result.cancelled.text' : 'result.failed.text')}</p>
-      {!cancelled && problem?.title && <p><strong>{problem.title}</strong></p>}
+      {!cancelled && problem?.title && (
+        <p>
+          <strong>{problem.title}</strong>
+        </p>
+      )}
       {!cancelled && problem?.detail && <p>{problem.detail}</p>}
     </div>
   );

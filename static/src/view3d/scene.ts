@@ -63,7 +63,11 @@ function set_shape(body: Body, points: Float32Array, polys: Uint32Array): void {
 }
 
 /* The bone above the bowl: a wall that goes on upwards from the rim, and a lid. */
-function bone_top(bowl: Faces, motion: Motion, scale: number): { points: number[]; polys: number[] } {
+function bone_top(
+  bowl: Faces,
+  motion: Motion,
+  scale: number,
+): { points: number[]; polys: number[] } {
   const points: number[] = [];
   const polys: number[] = [];
   for (const [sx, sy] of quarters) {
@@ -71,7 +75,11 @@ function bone_top(bowl: Faces, motion: Motion, scale: number): { points: number[
       const base = points.length / 3;
       const z_top = Math.max(...edge.map((n) => motion.at(n, 2, scale))) + bone_rise_mm;
       for (const n of edge) {
-        const [x, y, z] = [sx * motion.at(n, 0, scale), sy * motion.at(n, 1, scale), motion.at(n, 2, scale)];
+        const [x, y, z] = [
+          sx * motion.at(n, 0, scale),
+          sy * motion.at(n, 1, scale),
+          motion.at(n, 2, scale),
+        ];
         points.push(x, y, z, x, y, z_top);
       }
       points.push(0, 0, z_top);
@@ -83,7 +91,7 @@ function bone_top(bowl: Faces, motion: Motion, scale: number): { points: number[
 
 function with_offset(polys: Uint32Array, more: number[], offset: number): Uint32Array {
   const shifted: number[] = [];
-  for (let i = 0; i < more.length; ) {
+  for (let i = 0; i < more.length;) {
     const n = more[i++] as number;
     shifted.push(n);
     for (let k = 0; k < n; k++) shifted.push((more[i++] as number) + offset);
@@ -109,7 +117,8 @@ class Tissues implements Scene {
     const field = read_vtu(vtu);
     this.field = field;
     this.motion = motion_of(field);
-    const tissue = (wanted: number): Faces => boundary_faces(field, (e) => field.tissue[e] === wanted);
+    const tissue = (wanted: number): Faces =>
+      boundary_faces(field, (e) => field.tissue[e] === wanted);
     const muscle = tissue(0);
     this.faces = {
       muscle,
@@ -118,7 +127,10 @@ class Tissues implements Scene {
       cluster: boundary_faces(field, (e) => (field.cluster[e] as number) > 0),
       bone: bone_faces(field, muscle, this.motion.tip),
     };
-    this.window = vtkGenericRenderWindow.newInstance({ background: [1, 1, 1], listenWindowResize: false });
+    this.window = vtkGenericRenderWindow.newInstance({
+      background: [1, 1, 1],
+      listenWindowResize: false,
+    });
     this.window.setContainer(container);
     this.bodies = {
       muscle: make_body(colours.muscle),
@@ -139,7 +151,11 @@ class Tissues implements Scene {
     const shown = state.cut ? quarters.slice(1) : quarters;
     for (const name of ['muscle', 'fat', 'skin'] as const) {
       const faces = this.faces[name];
-      set_shape(this.bodies[name], place(faces, this.motion, state.scale, shown), cells(faces, shown));
+      set_shape(
+        this.bodies[name],
+        place(faces, this.motion, state.scale, shown),
+        cells(faces, shown),
+      );
       this.bodies[name].actor.getProperty().setOpacity(state.only_clusters ? 0.12 : 1);
     }
     this.place_whole(cluster, this.faces.cluster, state.scale);
@@ -184,7 +200,10 @@ class Tissues implements Scene {
     if (!canvas) throw new Error('no canvas');
     this.window.getRenderWindow().render();
     return new Promise((resolve, reject) => {
-      canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('no picture'))), 'image/png');
+      canvas.toBlob(
+        (blob) => (blob ? resolve(blob) : reject(new Error('no picture'))),
+        'image/png',
+      );
     });
   }
 
@@ -229,7 +248,9 @@ class Tissues implements Scene {
     const per_face = Float32Array.from(element, (e) => values[e] as number);
     const all = new Float32Array(per_face.length * copies);
     for (let i = 0; i < copies; i++) all.set(per_face, i * per_face.length);
-    muscle.data.getCellData().setScalars(vtkDataArray.newInstance({ name: state.colour, values: all }));
+    muscle.data
+      .getCellData()
+      .setScalars(vtkDataArray.newInstance({ name: state.colour, values: all }));
     muscle.mapper.setLookupTable(transfer(state.stops));
     muscle.mapper.setScalarModeToUseCellData();
     muscle.mapper.setUseLookupTableScalarRange(true);

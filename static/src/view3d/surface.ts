@@ -53,7 +53,8 @@ export function motion_of(field: Field): Motion {
     if (on_axis && unloaded(n, 2) > unloaded(tip, 2) - 1e-9) tip = n;
   }
   return {
-    at: (n, axis, scale) => unloaded(n, axis) + scale * (field.displacement_mm[3 * n + axis] as number),
+    at: (n, axis, scale) =>
+      unloaded(n, axis) + scale * (field.displacement_mm[3 * n + axis] as number),
     tip,
   };
 }
@@ -87,7 +88,12 @@ export const quarters: readonly Quarter[] = [
 
 /* Coordinates of every face corner of the chosen quarters, [quarter][face][4][3]: corners are not
  * shared, so that each face keeps its own colour and its own flat normal. */
-export function place(faces: Faces, motion: Motion, scale: number, chosen: readonly Quarter[]): Float32Array {
+export function place(
+  faces: Faces,
+  motion: Motion,
+  scale: number,
+  chosen: readonly Quarter[],
+): Float32Array {
   const out = new Float32Array(chosen.length * faces.nodes.length * 3);
   let k = 0;
   for (const [sx, sy] of chosen) {
@@ -126,6 +132,8 @@ export function rim_edges(bowl: Faces, motion: Motion): [number, number][] {
     }
   }
   const on_plane = ([a, b]: [number, number]): boolean =>
-    [0, 1].some((axis) => Math.abs(motion.at(a, axis, 0)) < 1e-9 && Math.abs(motion.at(b, axis, 0)) < 1e-9);
+    [0, 1].some(
+      (axis) => Math.abs(motion.at(a, axis, 0)) < 1e-9 && Math.abs(motion.at(b, axis, 0)) < 1e-9,
+    );
   return [...single.values()].filter((edge) => !on_plane(edge));
 }

@@ -29,7 +29,13 @@ function has_webgl(): boolean {
 
 /* The load path from nothing to full, whether or not the document lists its beginning. */
 function path_of(of: Finished): LoadPoint[] {
-  const start: LoadPoint = { F_N: 0, displacement_mm: 0, eps_max: 0, E_shear_max: 0, E_comp_max: 0 };
+  const start: LoadPoint = {
+    F_N: 0,
+    displacement_mm: 0,
+    eps_max: 0,
+    E_shear_max: 0,
+    E_comp_max: 0,
+  };
   return [start, ...of.result.load_curve.filter((p) => p.F_N > 0)];
 }
 
@@ -83,7 +89,8 @@ function use_scene(of: Finished, state: SceneState) {
         made.show(state);
         made.reset_view();
       },
-      (e: unknown) => wanted && set_stage({ is: 'failed', detail: String(e instanceof Error ? e.message : e) }),
+      (e: unknown) =>
+        wanted && set_stage({ is: 'failed', detail: String(e instanceof Error ? e.message : e) }),
     );
     return () => {
       wanted = false;
@@ -110,9 +117,15 @@ function Legend(props: { of: Finished; colour: Controls['colour'] }) {
       </defs>
       <rect x="10" y="2" width="280" height="12" fill={`url(#${id})`} />
       <path d={`M${x(threshold)} 0v17`} />
-      <text x="10" y="28">0</text>
-      <text x={Math.min(x(threshold), 232)} y="28" text-anchor="middle">{t('view.threshold', { value: threshold })}</text>
-      <text x="290" y="28" text-anchor="end">{format(max)}</text>
+      <text x="10" y="28">
+        0
+      </text>
+      <text x={Math.min(x(threshold), 232)} y="28" text-anchor="middle">
+        {t('view.threshold', { value: threshold })}
+      </text>
+      <text x="290" y="28" text-anchor="end">
+        {format(max)}
+      </text>
     </svg>
   );
 }
@@ -120,7 +133,11 @@ function Legend(props: { of: Finished; colour: Controls['colour'] }) {
 function Check(props: { label: string; on: boolean; change: (on: boolean) => void }) {
   return (
     <label class="check">
-      <input type="checkbox" checked={props.on} onChange={(e) => props.change(e.currentTarget.checked)} />
+      <input
+        type="checkbox"
+        checked={props.on}
+        onChange={(e) => props.change(e.currentTarget.checked)}
+      />
       {props.label}
     </label>
   );
@@ -173,16 +190,24 @@ const keys: Record<string, (scene: Scene) => void> = {
 export function View3d(props: { of: Finished; side: string; on_section: () => void }) {
   const { of } = props;
   const [c, set] = useState<Controls>({
-    colour: 'E_shear', cut: true, only_clusters: false, bone: true, seat: true, step: path_of(of).length - 1,
+    colour: 'E_shear',
+    cut: true,
+    only_clusters: false,
+    bone: true,
+    seat: true,
+    step: path_of(of).length - 1,
   });
   const change = (part: Partial<Controls>): void => set((now) => ({ ...now, ...part }));
   const { container, scene, stage } = use_scene(of, scene_state(of, c));
 
   if (stage.is === 'no_webgl' || stage.is === 'failed') {
-    const text = stage.is === 'failed' ? t('view.failed', { detail: stage.detail }) : t('view.no_webgl');
+    const text =
+      stage.is === 'failed' ? t('view.failed', { detail: stage.detail }) : t('view.no_webgl');
     return (
       <>
-        <p class="hint" role="status">{text}</p>
+        <p class="hint" role="status">
+          {text}
+        </p>
         <img src={section_path(of.id)} alt={t('picture.alt', { side: props.side })} />
       </>
     );
@@ -197,7 +222,11 @@ export function View3d(props: { of: Finished; side: string; on_section: () => vo
 
   return (
     <div class="view3d">
-      {stage.is === 'loading' && <p class="loading" role="status">{t('view.loading')}</p>}
+      {stage.is === 'loading' && (
+        <p class="loading" role="status">
+          {t('view.loading')}
+        </p>
+      )}
       <div
         class="canvas"
         ref={container}
@@ -211,17 +240,28 @@ export function View3d(props: { of: Finished; side: string; on_section: () => vo
       <div class="controls">
         <label>
           {t('view.colour')}{' '}
-          <select value={c.colour} onChange={(e) => change({ colour: e.currentTarget.value as Controls['colour'] })}>
+          <select
+            value={c.colour}
+            onChange={(e) => change({ colour: e.currentTarget.value as Controls['colour'] })}
+          >
             <option value="E_shear">{t('view.colour.shear')}</option>
             <option value="E_comp">{t('view.colour.comp')}</option>
           </select>
         </label>
         <Check label={t('view.cut')} on={c.cut} change={(cut) => change({ cut })} />
-        <Check label={t('view.clusters')} on={c.only_clusters} change={(only_clusters) => change({ only_clusters })} />
+        <Check
+          label={t('view.clusters')}
+          on={c.only_clusters}
+          change={(only_clusters) => change({ only_clusters })}
+        />
         <Check label={t('view.bone')} on={c.bone} change={(bone) => change({ bone })} />
         <Check label={t('view.seat')} on={c.seat} change={(seat) => change({ seat })} />
-        <button type="button" onClick={() => scene.current?.reset_view()}>{t('view.reset')}</button>
-        <button type="button" onClick={() => scene.current && save(scene.current, of.id)}>{t('view.screenshot')}</button>
+        <button type="button" onClick={() => scene.current?.reset_view()}>
+          {t('view.reset')}
+        </button>
+        <button type="button" onClick={() => scene.current && save(scene.current, of.id)}>
+          {t('view.screenshot')}
+        </button>
       </div>
     </div>
   );

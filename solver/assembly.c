@@ -1,0 +1,160 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "solver/assembly.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void number_equations(struct assembly *a, const struct mesh *mesh)
+{
+    for (int n = 0; n < mesh->node_count; n++) {
+        const unsigned flags = mesh->node_flags[n];
+        const bool bone = flags & NODE_ON_BONE;
+        a->equation[n][0] = bone || flags & NODE_ON_X0 ? EQUATION_FIXED : a->n++;
+        a->equation[n][1] = bone || flags & NODE_ON_Y0 ? EQUATION_FIXED : a->n++;
+        a->equation[n][2] = bone ? EQUATION_BONE : a->n++;
+    }
+}
+
+void assembly_element_equations(const struct assembly *a, const int hex[HEX_NODES],
+                                int ret[HEX_DOFS])
+{
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < HEX_NODES; k++) ret[c * HEX_NODES + k] = a->equation[hex[k]][c];
+}
+
+static int compare_ints(const void *a, const void *b)
+{
+    const int x = *(const int *)a, y = *(const int *)b;
+    return (x > y) - (x < y);
+}
+
+struct pattern {
+    int *start; /* [n + 1] */
+    int *row;   /* [start[n]] */
+};
+
+static void pattern_finish(struct pattern *p)
+{
+    free(p->start);
+    free(p->row);
+    *p = (struct pattern){0};
+}
+
+/* Counts, or with rows != NULL writes, every (row >= column) entry, repeats included. */
+static void visit_entries(const struct assembly *a, const struct mesh *mesh, int *place, int *rows)
+{
+    int eq[HEX_DOFS];
+    for (int e = 0; e < mesh->element_count; e++) {
+        assembly_element_equations(a, mesh->hex[e], eq);
+        for (int p = 0; p < HEX_DOFS; p++)
+            for (int q = 0; q < HEX_DOFS; q++) {
+                if (eq[q] < 0 || eq[p] < eq[q]) continue;
+                if (rows != NULL) rows[place[eq[q]]] = eq[p];
+                place[eq[q]]++;
+            }
+    }
+}
+
+/* Sorts each column and drops repeats; returns the number of entries kept. */
+static int compress_columns(int n, const int *loose_start, int *row, int *ret_start)
+{
+    int kept = 0;
+    for (int j = 0; j < n; j++) {
+        int *column = row + loose_start[j];
+        const int count = loose_start[j + 1] - loose_start[j];
+        qsort(column, (size_t)count, sizeof *column, compare_ints);
+        ret_start[j] = kept;
+        for (int k = 0; k < count; k++)
+            if (k == 0 || column[k] != column[k - 1]) row[kept++] = column[k];
+    }
+    ret_start[n] = kept;
+    return kept;
+}
+
+static bool pattern_init(struct pattern *ret, const struct assembly *a, const struct mesh *mesh)
+{
+    const size_t n = (size_t)a->n;
+    int *loose = calloc(n + 1, sizeof *loose), *place = calloc(n + 1, sizeof *place);
+    bool done = false;
+    *ret = (struct pattern){.start = calloc(n + 1, sizeof(int))};
+    if (loose == NULL || place == NULL || ret->start == NULL) goto out;
+    visit_entries(a, mesh, place, NULL);
+    for (int j = 0; j < a->n; j++) loose[j + 1] = loose[j] + place[j];
+    ret->row = malloc(sizeof(int) * (size_t)loose[n]);
+    if (ret->row == NULL) goto out;
+    memcpy(place, loose, sizeof *place * (n + 1));
+    visit_entries(a, mesh, place, ret->row);
+    (void)compress_columns(a->n, loose, ret->row, ret->start);
+    done = true;
+out:
+    free(loose);
+    free(place);
+    if (!done) pattern_finish(ret);
+    return done;
+}
+
+static int place_of(const struct pattern *p, int i, int j)
+{
+    const int row = i > j ? i : j, column = i > j ? j : i;
+    if (column < 0) return -1;
+    const int *found =
+        bsearch(&row, p->row + p->start[column], (size_t)(p->start[column + 1] - p->start[column]),
+                sizeof row, compare_ints);
+    return found != NULL ? (int)(found - p->row) : -1;
+}
+
+static void map_entries(struct assembly *a, const struct mesh *mesh, const struct pattern *p)
+{
+    int eq[HEX_DOFS];
+    for (int e = 0; e < mesh->element_count; e++) {
+        assembly_element_equations(a, mesh->hex[e], eq);
+        for (int i = 0, k = 0; i < HEX_DOFS; i++)
+            for (int j = 0; j <= i; j++, k++) a->scatter[e][k] = place_of(p, eq[i], eq[j]);
+    }
+    for (int n = 0; n < mesh->node_count; n++) {
+        for (int c = 0; c < 3; c++)
+            a->diagonal[n][c] = place_of(p, a->equation[n][c], a->equation[n][c]);
+        a->tangential[n] = place_of(p, a->equation[n][0], a->equation[n][1]);
+    }
+}
+
+enum ischia_code assembly_init(struct assembly *ret, const struct mesh *mesh,
+                               struct ischia_error *err)
+{
+    struct assembly a = {0};
+    struct pattern pattern = {0};
+    const size_t nodes = (size_t)mesh->node_count, elements = (size_t)mesh->element_count;
+    enum ischia_code code = FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the equations");
+    a.equation = calloc(nodes, sizeof *a.equation);
+    a.scatter = malloc(elements * sizeof *a.scatter);
+    a.diagonal = malloc(nodes * sizeof *a.diagonal);
+    a.tangential = malloc(nodes * sizeof *a.tangential);
+    if (!a.equation || !a.scatter || !a.diagonal || !a.tangential) goto out;
+    number_equations(&a, mesh);
+    if (!pattern_init(&pattern, &a, mesh)) goto out;
+    map_entries(&a, mesh, &pattern);
+    code = linear_create(&a.linear, a.n, pattern.start, pattern.row, err);
+out:
+    pattern_finish(&pattern);
+    if (code != ISCHIA_OK) {
+        assembly_finish(&a);
+        return code;
+    }
+    *ret = a;
+    return ISCHIA_OK;
+}
+
+void assembly_finish(struct assembly *a)
+{
+    free(a->equation);
+    free(a->scatter);
+    free(a->diagonal);
+    free(a->tangential);
+    linear_destroy(a->linear);
+    a->equation = NULL;
+    a->scatter = NULL;
+    a->diagonal = NULL;
+    a->tangential = NULL;
+    a->linear = NULL;
+}

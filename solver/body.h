@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SOLVER_BODY_H
+#define ISCHIA_SOLVER_BODY_H
+
+#include "solver/assembly.h"
+
+/* A mesh with its materials: elastic energy, gradient and Hessian of the whole. */
+
+struct element_volume {            /* what the tracked pressure of an element is carried on with */
+    double gradient[3][HEX_NODES]; /* dv/du, mm2                   */
+    double pressure_MPa;           /* kappa (v / V - 1) back then  */
+};
+
+struct body {
+    const struct mesh *mesh;
+    struct element_reference *reference; /* [element_count]                             */
+    struct element_material
+        material[TISSUE_COUNT];    /* by mesh->tissue                             */
+    double *pressure_MPa;          /* [element_count] tracked, for the Hessian    */
+    struct element_volume *volume; /* [element_count] of the last Hessian         */
+};
+
+ISCHIA_MUST_CHECK enum ischia_code body_init(struct body *ret, const struct mesh *mesh,
+                                             const struct element_material material[TISSUE_COUNT],
+                                             struct ischia_error *err);
+void body_finish(struct body *body); /* a zeroed one is allowed */
+
+struct body_derivatives {
+    double (*force)[3]; /* [node] gradient, N; every node, fixed ones included                   */
+    double *border;     /* [n] d2E / du dd, N/mm                                                 */
+    double corner;      /* d2E / dd2, N/mm                                                       */
+};
+
+/* Elastic energy in N mm at displacements u[node][3]; HUGE_VAL when an element is inverted. */
+double body_energy(const struct body *body, const double (*u_mm)[3]);
+
+/*
+ * The same with all derivatives; the Hessian goes to the values of assembly->linear, without
+ * the bone's d, which goes to border and corner. *ret is undefined when HUGE_VAL is returned.
+ */
+double body_linearise(struct body *body, const struct assembly *assembly, const double (*u_mm)[3],
+                      double convexity, struct body_derivatives *ret);
+
+/*
+ * After a move from the last linearised state: carries the tracked pressures on,
+ *     p <- alpha p(u) + (1 - alpha) p + kappa / V dv/du . move,
+ * alpha being the share of the Newton step that was taken.
+ */
+void body_track_pressure(struct body *body, double alpha, const double (*from_mm)[3],
+                         const double (*to_mm)[3]);
+
+/* Sets the tracked pressures to the true ones at u. */
+void body_reset_pressure(struct body *body, const double (*u_mm)[3]);
+
+/* Smallest det F over all integration points. */
+double body_det_F_min(const struct body *body, const double (*u_mm)[3]);
+
+#endif

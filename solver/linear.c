@@ -1,0 +1,143 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * The only file that sees cholmod.h. Traps that it stays clear of: the default mode factors an
+ * indefinite matrix as LDL^T in silence, so the supernodal LL^T is asked for by name; it returns
+ * TRUE for an indefinite matrix and says so in `status` and `minor` only; and a singular one may
+ * leave a factor that is not finite, which rcond shows.
+ */
+#include "solver/linear.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cholmod.h>
+
+struct linear {
+    cholmod_common common;
+    cholmod_sparse *A;      /* the values                                          */
+    cholmod_sparse *masked; /* what was factored: some equations may be taken out  */
+    cholmod_factor *L;
+    cholmod_dense *solution, *work_y, *work_e; /* reused from solve to solve */
+};
+
+static void common_init(cholmod_common *common)
+{
+    cholmod_start(common);
+    common->supernodal = CHOLMOD_SUPERNODAL;
+    common->final_ll = 1;
+    common->print = 0;
+    common->nmethods = 1;
+    common->method[0].ordering = CHOLMOD_METIS;
+    common->postorder = 1;
+}
+
+static bool pattern_init(struct linear *l, int n, const int *start, const int *row)
+{
+    const size_t nnz = (size_t)start[n];
+    l->A = cholmod_allocate_sparse((size_t)n, (size_t)n, nnz, 1, 1, -1, CHOLMOD_REAL, &l->common);
+    if (l->A == NULL) return false;
+    memcpy(l->A->p, start, sizeof(int) * (size_t)(n + 1));
+    memcpy(l->A->i, row, sizeof(int) * nnz);
+    memset(l->A->x, 0, sizeof(double) * nnz);
+    l->masked = cholmod_copy_sparse(l->A, &l->common);
+    if (l->masked == NULL) return false;
+    l->L = cholmod_analyze(l->A, &l->common);
+    return l->L != NULL && l->common.status == CHOLMOD_OK;
+}
+
+enum ischia_code linear_create(struct linear **ret, int n, const int *start, const int *row,
+                               struct ischia_error *err)
+{
+    struct linear *l = calloc(1, sizeof *l);
+    CHECK(l != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the linear solver");
+    common_init(&l->common);
+    if (!pattern_init(l, n, start, row)) {
+        const bool memory = l->common.status == CHOLMOD_OUT_OF_MEMORY;
+        linear_destroy(l);
+        return FAIL(err, memory ? ISCHIA_E_MEMORY : ISCHIA_E_NUMERIC,
+                    "the analysis of a matrix of %d columns failed", n);
+    }
+    *ret = l;
+    return ISCHIA_OK;
+}
+
+void linear_destroy(struct linear *l)
+{
+    if (l == NULL) return;
+    cholmod_free_sparse(&l->A, &l->common);
+    cholmod_free_sparse(&l->masked, &l->common);
+    cholmod_free_factor(&l->L, &l->common);
+    cholmod_free_dense(&l->solution, &l->common);
+    cholmod_free_dense(&l->work_y, &l->common);
+    cholmod_free_dense(&l->work_e, &l->common);
+    cholmod_finish(&l->common);
+    free(l);
+}
+
+double *linear_values(struct linear *l) { return l->A->x; }
+
+void linear_clear(struct linear *l) { memset(l->A->x, 0, sizeof(double) * l->A->nzmax); }
+
+/* What is factored: the values with the rows and columns of dropped equations replaced by 1. */
+static void copy_masked(struct linear *l, const unsigned char *keep)
+{
+    const int *start = l->A->p, *row = l->A->i;
+    const double *from = l->A->x;
+    double *to = l->masked->x;
+    for (int j = 0; j < (int)l->A->ncol; j++)
+        for (int k = start[j]; k < start[j + 1]; k++)
+            to[k] = keep == NULL || (keep[j] && keep[row[k]]) ? from[k] : row[k] == j;
+}
+
+enum ischia_code linear_factor(struct linear *l, const unsigned char *keep,
+                               enum linear_outcome *ret_outcome, struct ischia_error *err)
+{
+    copy_masked(l, keep);
+    cholmod_factorize(l->masked, l->L, &l->common);
+    CHECK(l->common.status != CHOLMOD_OUT_OF_MEMORY, err, ISCHIA_E_MEMORY,
+          "not enough memory to factor %zu equations", l->A->ncol);
+    CHECK(l->common.status >= CHOLMOD_OK, err, ISCHIA_E_NUMERIC, "CHOLMOD reported status %d",
+          l->common.status);
+    const bool complete = l->common.status == CHOLMOD_OK && l->L->minor == l->L->n;
+    const double rcond = complete ? cholmod_rcond(l->L, &l->common) : 0;
+    *ret_outcome = rcond > 0 && isfinite(rcond) ? LINEAR_FACTORED : LINEAR_NOT_POSITIVE_DEFINITE;
+    return ISCHIA_OK;
+}
+
+enum ischia_code linear_solve(struct linear *l, int count, double *x, struct ischia_error *err)
+{
+    const size_t n = l->A->nrow;
+    cholmod_dense b = {.nrow = n,
+                       .ncol = (size_t)count,
+                       .nzmax = n * (size_t)count,
+                       .d = n,
+                       .x = x,
+                       .xtype = CHOLMOD_REAL,
+                       .dtype = CHOLMOD_DOUBLE};
+    const int done = cholmod_solve2(CHOLMOD_A, l->L, &b, NULL, &l->solution, NULL, &l->work_y,
+                                    &l->work_e, &l->common);
+    CHECK(done, err, l->common.status == CHOLMOD_OUT_OF_MEMORY ? ISCHIA_E_MEMORY : ISCHIA_E_NUMERIC,
+          "CHOLMOD could not solve (status %d)", l->common.status);
+    memcpy(x, l->solution->x, sizeof *x * n * (size_t)count);
+    return ISCHIA_OK;
+}
+
+void linear_multiply(const struct linear *l, const double *x, double *ret)
+{
+    const int *start = l->A->p, *row = l->A->i;
+    const double *value = l->A->x;
+    const int n = (int)l->A->ncol;
+    memset(ret, 0, sizeof *ret * (size_t)n);
+    for (int j = 0; j < n; j++) {
+        double sum = 0;
+        for (int k = start[j]; k < start[j + 1]; k++) {
+            sum += value[k] * x[row[k]];
+            if (row[k] != j) ret[row[k]] += value[k] * x[j];
+        }
+        ret[j] += sum;
+    }
+}
+
+double linear_flops(const struct linear *l) { return l->common.fl; }
+double linear_factor_nonzeros(const struct linear *l) { return l->common.lnz; }

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SOLVER_LINEAR_H
+#define ISCHIA_SOLVER_LINEAR_H
+
+#include <stdbool.h>
+
+#include "solver/error.h"
+
+/*
+ * Sparse symmetric positive definite systems A x = b by supernodal Cholesky (CHOLMOD): analysed
+ * once for a pattern, factored for many values. The lower triangle is stored by columns, rows
+ * ascending, the diagonal always present.
+ */
+
+struct linear;
+
+enum linear_outcome {
+    LINEAR_FACTORED,
+    LINEAR_NOT_POSITIVE_DEFINITE /* a pivot was not positive, or the factor is not finite */
+};
+
+/*
+ * Analyses the pattern: n columns; column j holds row[start[j]] ... row[start[j + 1] - 1]. The
+ * pattern is copied. *ret is the caller's to destroy.
+ */
+ISCHIA_MUST_CHECK enum ischia_code linear_create(struct linear **ret, int n, const int *start,
+                                                 const int *row, struct ischia_error *err);
+void linear_destroy(struct linear *linear); /* NULL allowed */
+
+/* The values of the lower triangle, to be written in the order of the pattern before factoring. */
+double *linear_values(struct linear *linear);
+void linear_clear(struct linear *linear); /* sets them all to zero */
+
+/*
+ * Factors the present values, which stay as they are. Equations with keep[i] == 0 are taken out:
+ * the solution there is the right-hand side (keep NULL: none is). ISCHIA_E_MEMORY or
+ * ISCHIA_E_NUMERIC only when CHOLMOD cannot work.
+ */
+ISCHIA_MUST_CHECK enum ischia_code linear_factor(struct linear *linear, const unsigned char *keep,
+                                                 enum linear_outcome *ret_outcome,
+                                                 struct ischia_error *err);
+
+/* Solves for `count` right-hand sides, [count][n], in place, with the last factor. */
+ISCHIA_MUST_CHECK enum ischia_code linear_solve(struct linear *linear, int count, double *x,
+                                                struct ischia_error *err);
+
+/* ret = A x with the present values: all equations, nothing taken out. */
+void linear_multiply(const struct linear *linear, const double *x, double *ret);
+
+/* Cost of one factorisation, from the analysis. */
+double linear_flops(const struct linear *linear);
+double linear_factor_nonzeros(const struct linear *linear);
+
+#endif

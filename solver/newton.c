@@ -1,0 +1,520 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Two kinds of step.
+ *
+ * The descent step holds the friction limits mu N at their lagged values. The load step is then a
+ * minimisation, its tangent K is symmetric, and a line search on the potential makes the step safe
+ * from anywhere: where K is not positive definite it is made so (element.h, convexity).
+ *
+ * The exact step, taken once the residual is small, adds the change of N with the displacements,
+ * mu t dN: the true derivative of Coulomb's law, not symmetric, of low rank. GMRES solves with it,
+ * preconditioned by the factor of K. It is kept when the residual falls, and undone otherwise.
+ *
+ * d enters as a border: [K b; b' c] [du; dd] = -[g; g_d] by one more solve with K's factor.
+ */
+#include "solver/newton.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "solver/gmres.h"
+
+/* Armijo's constant; the shortest step tried; potential changes below this share of the elastic
+ * energy are rounding and say nothing about descent. */
+static const double armijo = 1e-4;
+static const double step_min = 1e-6;
+static const double energy_rounding = 1e-12;
+/* The lagged limits are renewed once the rest of the residual is this share of the whole. */
+static const double relag_share = 0.1;
+/* Exact steps start below this residual, and must then reduce it by this factor. */
+static const double exact_below = 10;
+static const double exact_reduction = 0.7;
+static const double gmres_tolerance = 1e-4;
+/* A direction that moves a node further than this, over the tissue's height, comes from a tangent
+ * that is nearly singular: descend instead. */
+static const double exact_move_max = 0.1;
+/* How often a direction is found anew because it pushes further nodes through the seat. */
+enum { landing_rounds = 4 };
+
+/* Convexities tried in turn until the tangent is positive definite. */
+static const double convexity_ladder[] = {0, 0.3, 1};
+
+struct newton {
+    struct body *body;
+    struct assembly *assembly;
+    struct seat *seat;
+    int n;
+    double (*force)[3];  /* [node] gradient of the potential                                  */
+    double (*trial)[3];  /* [node]                                                            */
+    double (*saved)[3];  /* [node] displacements before an exact step                         */
+    double *normal_N;    /* [node] contact forces of the present iterate                      */
+    double *border;      /* [n] d2E / du dd                                                   */
+    double *landing;     /* [n] z step that ends on the seat, of nodes about to touch it      */
+    double *from_border; /* [n] K^-1 of the masked border, of the present factor              */
+    double *direction;   /* [n + 1] du, dd                                                    */
+    double *scratch;     /* [n + 1]                                                           */
+    double *krylov;
+    unsigned char *keep; /* [n] 0: on the seat, out of the system                             */
+    double corner;       /* d2E / dd2                                                         */
+    double schur;        /* corner - border . from_border                                     */
+    double elastic_Nmm;
+    double reaction_N; /* of the bone                                                       */
+    double residual;   /* with the contact forces of the present iterate                    */
+    double lagged_residual;
+    bool force_controlled;
+};
+
+enum ischia_code newton_create(struct newton **ret, struct body *body, struct assembly *assembly,
+                               struct seat *seat, struct ischia_error *err)
+{
+    const size_t nodes = (size_t)body->mesh->node_count, n = (size_t)assembly->n;
+    struct newton *w = calloc(1, sizeof *w);
+    CHECK(w != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the Newton iteration");
+    *w = (struct newton){.body = body, .assembly = assembly, .seat = seat, .n = assembly->n};
+    w->force = calloc(nodes, sizeof *w->force);
+    w->trial = calloc(nodes, sizeof *w->trial);
+    w->saved = calloc(nodes, sizeof *w->saved);
+    w->normal_N = calloc(nodes, sizeof *w->normal_N);
+    w->border = calloc(n, sizeof *w->border);
+    w->landing = calloc(n, sizeof *w->landing);
+    w->from_border = calloc(n, sizeof *w->from_border);
+    w->direction = calloc(n + 1, sizeof *w->direction);
+    w->scratch = calloc(n + 1, sizeof *w->scratch);
+    w->krylov = malloc(gmres_work_size(assembly->n + 1) * sizeof *w->krylov);
+    w->keep = calloc(n, sizeof *w->keep);
+    if (!w->force || !w->trial || !w->saved || !w->normal_N || !w->border || !w->landing ||
+        !w->from_border || !w->direction || !w->scratch || !w->krylov || !w->keep) {
+        newton_destroy(w);
+        return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the Newton iteration");
+    }
+    *ret = w;
+    return ISCHIA_OK;
+}
+
+void newton_destroy(struct newton *w)
+{
+    if (w == NULL) return;
+    free(w->force);
+    free(w->trial);
+    free(w->saved);
+    free(w->normal_N);
+    free(w->border);
+    free(w->landing);
+    free(w->from_border);
+    free(w->direction);
+    free(w->scratch);
+    free(w->krylov);
+    free(w->keep);
+    free(w);
+}
+
+/* --- the state: gradient, Hessian, contact ---------------------------------------------------- */
+
+static double bone_reaction_N(const struct newton *w)
+{
+    double sum = 0;
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        if (w->assembly->equation[n][2] == EQUATION_BONE) sum -= w->force[n][2];
+    return sum;
+}
+
+static double residual_norm(const struct newton *w, const double (*force)[3],
+                            const struct newton_control *control)
+{
+    double sum = 0;
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        for (int c = 0; c < 3; c++) {
+            const int eq = w->assembly->equation[n][c];
+            if (eq >= 0 && w->keep[eq]) sum += force[n][c] * force[n][c];
+        }
+    if (control->force_controlled) sum += pow(w->reaction_N - control->force_N, 2);
+    return sqrt(sum) / control->force_N;
+}
+
+/* The residual that friction with the given normal forces leaves; w->trial is the work space. */
+static double residual_with(struct newton *w, const double *normal_N, const double (*u)[3],
+                            const struct newton_control *control)
+{
+    memcpy(w->trial, w->force, sizeof *w->force * (size_t)w->body->mesh->node_count);
+    seat_add_force(w->seat, normal_N, u, w->trial);
+    return residual_norm(w, (const double(*)[3])w->trial, control);
+}
+
+static void find_contact(struct newton *w, const double (*u)[3])
+{
+    const struct mesh *mesh = w->body->mesh;
+    memset(w->keep, 1, (size_t)w->n);
+    memset(w->landing, 0, sizeof *w->landing * (size_t)w->n);
+    for (int n = 0; n < mesh->node_count; n++) {
+        const bool binds = seat_binds(mesh, u, (const double(*)[3])w->force, n);
+        w->normal_N[n] = binds ? w->force[n][2] : 0;
+        if (binds) w->keep[w->assembly->equation[n][2]] = 0;
+    }
+}
+
+/* Everything at u: energy, gradient, tangent, contact, residuals. Renews the lagged contact forces
+ * when they are what holds the residual up, and always for an exact step. */
+static void linearise(struct newton *w, const double (*u)[3], double convexity, bool exact,
+                      const struct newton_control *control)
+{
+    struct body_derivatives d = {.force = w->force, .border = w->border};
+    w->elastic_Nmm = body_linearise(w->body, w->assembly, u, convexity, &d);
+    w->corner = d.corner;
+    w->reaction_N = bone_reaction_N(w);
+    find_contact(w, u);
+    w->residual = residual_with(w, w->normal_N, u, control);
+    w->lagged_residual = residual_with(w, w->seat->normal_N, u, control);
+    if (exact || w->lagged_residual < relag_share * w->residual)
+        memcpy(w->seat->normal_N, w->normal_N,
+               sizeof *w->normal_N * (size_t)w->body->mesh->node_count);
+    seat_add_force(w->seat, w->seat->normal_N, u, w->force);
+    seat_add_stiffness(w->seat, w->assembly, u);
+}
+
+/* --- the linear system ------------------------------------------------------------------------ */
+
+static double dot(int n, const double *a, const double *b)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+/* x = K^-1 x, bordered under force control; x[n] belongs to d. */
+static enum ischia_code bordered_solve(void *context, double *x, struct ischia_error *err)
+{
+    struct newton *w = context;
+    TRY(linear_solve(w->assembly->linear, 1, x, err));
+    if (!w->force_controlled) {
+        x[w->n] = 0;
+        return ISCHIA_OK;
+    }
+    x[w->n] = (x[w->n] - dot(w->n, w->border, x)) / w->schur;
+    for (int i = 0; i < w->n; i++) x[i] -= x[w->n] * w->from_border[i];
+    return ISCHIA_OK;
+}
+
+/* y = the exact tangent times x: K's rows, and mu t dN for the slipping nodes. */
+static void apply_exact(void *context, const double *x, double *ret_y)
+{
+    struct newton *w = context;
+    const double dd = w->force_controlled ? x[w->n] : 0;
+    linear_multiply(w->assembly->linear, x, ret_y);
+    for (int i = 0; i < w->n; i++) ret_y[i] += dd * w->border[i];
+    seat_add_normal_change(w->seat, w->assembly, (const double(*)[3])w->trial, ret_y);
+    for (int i = 0; i < w->n; i++)
+        if (!w->keep[i]) ret_y[i] = 0;
+    ret_y[w->n] = w->force_controlled ? dot(w->n, w->border, x) + w->corner * dd : 0;
+    /* border has no entries outside the mask's columns of x, where x is zero */
+}
+
+/* ret[n + 1] = right-hand side of the step: minus the gradient, less what landing nodes bring. */
+static void load_right_hand_side(struct newton *w, const struct newton_control *control,
+                                 double *ret)
+{
+    linear_multiply(w->assembly->linear, w->landing, w->scratch);
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        for (int c = 0; c < 3; c++) {
+            const int eq = w->assembly->equation[n][c];
+            if (eq >= 0) ret[eq] = w->keep[eq] ? -w->force[n][c] - w->scratch[eq] : 0;
+        }
+    ret[w->n] = control->force_controlled
+                    ? control->force_N - w->reaction_N - dot(w->n, w->border, w->landing)
+                    : 0;
+}
+
+static double largest_move_mm(const struct newton *w)
+{
+    double largest = 0;
+    for (int i = 0; i < w->n; i++) largest = fmax(largest, fabs(w->direction[i]));
+    return largest;
+}
+
+static void add_landing(struct newton *w)
+{
+    for (int i = 0; i < w->n; i++) w->direction[i] += w->landing[i];
+}
+
+/* Takes the nodes that the direction would push through the seat out of the system, to land on it;
+ * returns how many there are. */
+static int find_landing(struct newton *w, const struct equilibrium *state)
+{
+    const struct mesh *mesh = w->body->mesh;
+    int count = 0;
+    for (int n = 0; n < mesh->node_count; n++) {
+        const int eq = w->assembly->equation[n][2];
+        if (!(mesh->node_flags[n] & NODE_ON_SEAT) || eq < 0 || !w->keep[eq]) continue;
+        const double gap = seat_gap_mm(mesh, (const double(*)[3])state->u_mm, n);
+        if (gap + w->direction[eq] >= 0) continue;
+        w->keep[eq] = 0;
+        w->landing[eq] = -gap;
+        count++;
+    }
+    return count;
+}
+
+/* Factors the tangent and solves for the border; *ret_definite tells whether both gave descent. */
+static enum ischia_code factor(struct newton *w, struct newton_report *report, bool *ret_definite,
+                               struct ischia_error *err)
+{
+    enum linear_outcome outcome;
+    TRY(linear_factor(w->assembly->linear, w->keep, &outcome, err));
+    report->factorisations++;
+    *ret_definite = outcome == LINEAR_FACTORED;
+    if (!*ret_definite) return ISCHIA_OK;
+    for (int i = 0; i < w->n; i++) w->from_border[i] = w->keep[i] ? w->border[i] : 0;
+    TRY(linear_solve(w->assembly->linear, 1, w->from_border, err));
+    w->schur = w->corner - dot(w->n, w->border, w->from_border);
+    if (w->force_controlled) *ret_definite = w->schur > 0;
+    return ISCHIA_OK;
+}
+
+/* Raises the convexity of the tangent until it is positive definite. */
+static enum ischia_code factor_definite(struct newton *w, const struct equilibrium *state,
+                                        const struct newton_control *control,
+                                        struct newton_report *report, bool *ret_definite,
+                                        struct ischia_error *err)
+{
+    const size_t rungs = sizeof convexity_ladder / sizeof convexity_ladder[0];
+    *ret_definite = false;
+    for (size_t i = 0; i < rungs && !*ret_definite; i++) {
+        if (i > 0)
+            linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[i], false, control);
+        TRY(factor(w, report, ret_definite, err));
+    }
+    return ISCHIA_OK;
+}
+
+/* --- moving ----------------------------------------------------------------------------------- */
+
+/* trial = state moved by alpha along the direction, stopped at the seat. Returns the gradient times
+ * the move that was really made. */
+static double move(struct newton *w, const struct equilibrium *state, double alpha,
+                   const struct newton_control *control)
+{
+    const struct mesh *mesh = w->body->mesh;
+    const double dd = w->direction[w->n];
+    double slope = alpha * dd * (control->force_controlled ? w->reaction_N - control->force_N : 0);
+    for (int n = 0; n < mesh->node_count; n++) {
+        for (int c = 0; c < 3; c++) {
+            const int eq = w->assembly->equation[n][c];
+            w->trial[n][c] = state->u_mm[n][c];
+            if (eq >= 0) w->trial[n][c] += alpha * w->direction[eq];
+            if (eq == EQUATION_BONE) w->trial[n][c] = -(state->d_mm + alpha * dd);
+        }
+        if (mesh->node_flags[n] & NODE_ON_SEAT)
+            w->trial[n][2] = fmax(w->trial[n][2], -mesh->X_mm[n][2]);
+        for (int c = 0; c < 3; c++)
+            if (w->assembly->equation[n][c] >= 0)
+                slope += w->force[n][c] * (w->trial[n][c] - state->u_mm[n][c]);
+    }
+    return slope;
+}
+
+static void accept(struct newton *w, struct equilibrium *state, double alpha)
+{
+    body_track_pressure(w->body, alpha, (const double(*)[3])state->u_mm,
+                        (const double(*)[3])w->trial);
+    memcpy(state->u_mm, w->trial, sizeof *w->trial * (size_t)w->body->mesh->node_count);
+    state->d_mm += alpha * w->direction[w->n];
+}
+
+static double potential(const struct newton *w, const double (*u)[3], double d_mm,
+                        const struct newton_control *control, double elastic_Nmm)
+{
+    if (elastic_Nmm == HUGE_VAL) return HUGE_VAL;
+    return elastic_Nmm + seat_energy(w->seat, u) -
+           (control->force_controlled ? control->force_N * d_mm : 0);
+}
+
+/* Backtracks until the potential falls enough; false when it never does. */
+static bool line_search(struct newton *w, struct equilibrium *state,
+                        const struct newton_control *control)
+{
+    const double(*trial)[3] = (const double(*)[3])w->trial;
+    const double before =
+        potential(w, (const double(*)[3])state->u_mm, state->d_mm, control, w->elastic_Nmm);
+    const double noise = energy_rounding * fabs(w->elastic_Nmm);
+    for (double alpha = 1; alpha >= step_min; alpha /= 2) {
+        const double slope = move(w, state, alpha, control);
+        const double d = state->d_mm + alpha * w->direction[w->n];
+        const double after = potential(w, trial, d, control, body_energy(w->body, trial));
+        if (after > before + armijo * slope + noise) continue;
+        accept(w, state, alpha);
+        return true;
+    }
+    return false;
+}
+
+/* Shortens the step until det F > 0; false when it never is. */
+static bool move_uninverted(struct newton *w, struct equilibrium *state,
+                            const struct newton_control *control)
+{
+    for (double alpha = 1; alpha >= step_min; alpha /= 2) {
+        (void)move(w, state, alpha, control);
+        if (!(body_det_F_min(w->body, (const double(*)[3])w->trial) > 0)) continue;
+        accept(w, state, alpha);
+        return true;
+    }
+    return false;
+}
+
+/* --- the two kinds of step -------------------------------------------------------------------- */
+
+static enum ischia_code descent_step(struct newton *w, struct equilibrium *state,
+                                     const struct newton_control *control,
+                                     struct newton_report *report, struct ischia_error *err)
+{
+    bool definite;
+    TRY(factor_definite(w, state, control, report, &definite, err));
+    if (definite) {
+        load_right_hand_side(w, control, w->direction);
+        TRY(bordered_solve(w, w->direction, err));
+    }
+    if (!definite)
+        report->reason = ISCHIA_DIVERGED_LINEAR;
+    else if (!line_search(w, state, control))
+        report->reason = ISCHIA_DIVERGED_STEP;
+    return ISCHIA_OK;
+}
+
+/* *ret_made is false when the tangent is not definite or GMRES gets nowhere; nothing moved then. */
+static enum ischia_code
+exact_step(struct newton *w, struct equilibrium *state, const struct newton_control *control,
+           struct newton_report *report, bool *ret_made, struct ischia_error *err)
+{
+    const struct gmres_operator op = {apply_exact, bordered_solve, w};
+    double reached = 0;
+    memcpy(w->trial, state->u_mm, sizeof *w->trial * (size_t)w->body->mesh->node_count);
+    for (int round = 0; round < landing_rounds; round++) {
+        TRY(factor(w, report, ret_made, err));
+        if (!*ret_made) return ISCHIA_OK;
+        load_right_hand_side(w, control, w->direction);
+        TRY(gmres(&op, w->n + 1, gmres_tolerance, w->direction, w->krylov, &reached, err));
+        add_landing(w);
+        *ret_made = reached < exact_reduction &&
+                    largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm;
+        if (!*ret_made) return ISCHIA_OK;
+        if (find_landing(w, state) == 0) break;
+    }
+    *ret_made = move_uninverted(w, state, control);
+    return ISCHIA_OK;
+}
+
+/*
+ * A run of exact steps. Nodes that change between stick and slip make the residual rise for a step
+ * or two before it falls, so a run may go on for a few steps without a new best; then it is undone
+ * to the best state and steps of descent take over (a watchdog; Chamberlain and others 1982).
+ */
+struct exact_run {
+    bool active;
+    int idle;        /* steps since the best residual                       */
+    int rest;        /* steps of descent before the next run                */
+    double residual; /* the best                                            */
+    double d_mm;     /* at the best; the displacements are in newton->saved */
+};
+static const int exact_idle_max = 4;
+static const int exact_rest = 2;
+
+static void run_save(struct newton *w, const struct equilibrium *state, struct exact_run *run)
+{
+    memcpy(w->saved, state->u_mm, sizeof *w->saved * (size_t)w->body->mesh->node_count);
+    run->residual = w->residual;
+    run->d_mm = state->d_mm;
+    run->idle = 0;
+}
+
+static void run_undo(struct newton *w, struct equilibrium *state, struct exact_run *run,
+                     const struct newton_control *control)
+{
+    memcpy(state->u_mm, w->saved, sizeof *w->saved * (size_t)w->body->mesh->node_count);
+    state->d_mm = run->d_mm;
+    *run = (struct exact_run){.rest = exact_rest};
+    body_reset_pressure(w->body, (const double(*)[3])state->u_mm);
+    linearise(w, (const double(*)[3])state->u_mm, 0, true, control);
+}
+
+/* Decides whether the run starts, goes on, or is undone, from the residual just found. */
+static void run_update(struct newton *w, struct equilibrium *state, struct exact_run *run,
+                       const struct newton_control *control)
+{
+    if (!run->active) {
+        run->active = run->rest-- <= 0 && w->residual < exact_below;
+        if (run->active) run_save(w, state, run);
+    } else if (w->residual < exact_reduction * run->residual) {
+        run_save(w, state, run);
+    } else if (++run->idle > exact_idle_max) {
+        run_undo(w, state, run, control);
+    }
+    if (run->active && memcmp(w->seat->normal_N, w->normal_N,
+                              sizeof *w->normal_N * (size_t)w->body->mesh->node_count) != 0)
+        linearise(w, (const double(*)[3])state->u_mm, 0, true, control);
+}
+
+static enum ischia_code one_step(struct newton *w, struct equilibrium *state,
+                                 const struct newton_control *control, struct exact_run *run,
+                                 struct newton_report *report, struct ischia_error *err)
+{
+    if (run->active) {
+        bool made;
+        TRY(exact_step(w, state, control, report, &made, err));
+        if (made) return ISCHIA_OK;
+        run_undo(w, state, run, control);
+    }
+    return descent_step(w, state, control, report, err);
+}
+
+enum ischia_code newton_minimise(struct newton *w, struct equilibrium *state,
+                                 const struct newton_control *control, newton_observe *observe,
+                                 void *context, struct newton_report *ret_report,
+                                 struct ischia_error *err)
+{
+    struct newton_report report = {.reason = ISCHIA_NOT_STARTED};
+    struct exact_run run = {0};
+    w->force_controlled = control->force_controlled;
+    while (report.reason == ISCHIA_NOT_STARTED) {
+        linearise(w, (const double(*)[3])state->u_mm, 0, run.active, control);
+        run_update(w, state, &run, control);
+        report.residual = w->residual;
+        state->force_N = w->reaction_N;
+        state->elastic_Nmm = w->elastic_Nmm;
+        if (observe != NULL && !observe(context, &report, w->reaction_N))
+            return FAIL(err, ISCHIA_E_CANCELLED, "cancelled");
+        if (w->residual <= control->tolerance)
+            report.reason = ISCHIA_CONVERGED;
+        else if (report.iterations++ >= control->iterations_max)
+            report.reason = ISCHIA_DIVERGED_ITERATIONS;
+        else
+            TRY(one_step(w, state, control, &run, &report, err));
+    }
+    memcpy(w->seat->normal_N, w->normal_N, sizeof *w->normal_N * (size_t)w->body->mesh->node_count);
+    *ret_report = report;
+    return ISCHIA_OK;
+}
+
+void newton_linearise(struct newton *w, const struct equilibrium *state)
+{
+    const struct newton_control any_scale = {.force_N = 1};
+    const double(*u)[3] = (const double(*)[3])state->u_mm;
+    w->force_controlled = false;
+    body_reset_pressure(w->body, u);
+    linearise(w, u, 0, false, &any_scale);
+}
+
+enum ischia_code newton_tangent(struct newton *w, double *ret_stiffness_N_mm,
+                                double (*ret_direction)[3], struct ischia_error *err)
+{
+    bool definite;
+    struct newton_report report = {0};
+    TRY(factor(w, &report, &definite, err));
+    *ret_stiffness_N_mm = definite ? w->schur : 0;
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        for (int c = 0; c < 3; c++) {
+            const int eq = w->assembly->equation[n][c];
+            ret_direction[n][c] = 0;
+            if (eq >= 0 && w->keep[eq]) ret_direction[n][c] = -w->from_border[eq];
+            if (eq == EQUATION_BONE) ret_direction[n][c] = -1;
+        }
+    return ISCHIA_OK;
+}

@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SOLVER_NEWTON_H
+#define ISCHIA_SOLVER_NEWTON_H
+
+#include "solver/body.h"
+#include "solver/result.h"
+#include "solver/seat.h"
+#include "solver/solver.h"
+
+/*
+ * One load step: the minimum over u and, under force control, the approach d, of
+ *
+ *     elastic energy(u, d) + friction potential(u; N) - force * d     subject to gap(u) >= 0,
+ *
+ * by projected Newton steps (Bertsekas 1982): nodes that the gradient presses on the seat leave the
+ * system, the others move along the Newton direction and are stopped at the seat. A line search
+ * keeps det F > 0 and the potential falling. N is the contact force of the present iterate.
+ */
+
+struct equilibrium { /* the state of a body on its seat */
+    double (*u_mm)[3];
+    double d_mm;    /* approach of bone and seat                        */
+    double force_N; /* reaction on the bone, of the quarter model       */
+    double elastic_Nmm;
+};
+
+struct newton_control {
+    bool force_controlled;
+    double force_N;   /* quarter model's: the target, and the scale of the residual */
+    double tolerance; /* |residual| / force_N                                       */
+    int iterations_max;
+};
+
+struct newton_report {
+    enum ischia_reason reason;
+    int iterations;
+    int factorisations;
+    double residual; /* relative */
+};
+
+struct newton; /* work space for one body: directions, gradients, masks */
+
+ISCHIA_MUST_CHECK enum ischia_code newton_create(struct newton **ret, struct body *body,
+                                                 struct assembly *assembly, struct seat *seat,
+                                                 struct ischia_error *err);
+void newton_destroy(struct newton *newton); /* NULL allowed */
+
+/* Called after each iteration; false cancels. */
+typedef bool newton_observe(void *context, const struct newton_report *report, double force_N);
+
+/* Minimises from *state in place. state->d_mm is kept under displacement control. */
+ISCHIA_MUST_CHECK enum ischia_code
+newton_minimise(struct newton *newton, struct equilibrium *state,
+                const struct newton_control *control, newton_observe *observe, void *context,
+                struct newton_report *ret_report, struct ischia_error *err);
+
+/* Prepares for newton_tangent at a state that was not just minimised: at rest, or gone back to. */
+void newton_linearise(struct newton *newton, const struct equilibrium *state);
+
+/*
+ * Factors the tangent of the state that the last minimisation or linearisation left: stiffness dF/dd (0 when it
+ * is not positive) and the matching direction du/dd, friction limits held. ret_direction[node][3].
+ */
+ISCHIA_MUST_CHECK enum ischia_code newton_tangent(struct newton *newton, double *ret_stiffness_N_mm,
+                                                  double (*ret_direction)[3],
+                                                  struct ischia_error *err);
+
+#endif

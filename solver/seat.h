@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SOLVER_SEAT_H
+#define ISCHIA_SOLVER_SEAT_H
+
+#include <stdbool.h>
+
+#include "solver/assembly.h"
+
+/*
+ * The rigid seat z = 0: unilateral contact, node by node and exact (z >= 0, no penalty), and
+ * Coulomb friction.
+ *
+ * Contact is a bound on the nodes' z; the contact force N of a node on the bound is the gradient
+ * of the energy there. Friction acts on a node through a spring of stiffness k from an anchor on
+ * the seat that slips when the spring's force would exceed mu N. With N held fixed ("lagged") this
+ * derives from a convex potential of the tangential distance r from the anchor,
+ *
+ *     phi(r) = k r^2 / 2                      while k r <= mu N,
+ *              mu N r - (mu N)^2 / (2 k)      beyond,
+ *
+ * which makes a load step a minimisation. The anchor moves only between load steps.
+ */
+
+struct seat {
+    double friction;              /* Coulomb's coefficient                                       */
+    double *stick_stiffness_N_mm; /* [node] k above, by the area that belongs to the node        */
+    double (*anchor_mm)[2];       /* [node] where the spring is fixed: displacement, x and y     */
+    double *normal_N;             /* [node] N, lagged; zero where the node does not press        */
+    int node_count;
+};
+
+ISCHIA_MUST_CHECK enum ischia_code seat_init(struct seat *ret, const struct mesh *mesh,
+                                             double friction, struct ischia_error *err);
+void seat_finish(struct seat *seat);
+
+/* Height of node n above the seat. */
+static inline double seat_gap_mm(const struct mesh *mesh, const double (*u_mm)[3], int n)
+{
+    return mesh->X_mm[n][2] + u_mm[n][2];
+}
+
+/* True when node n lies on the seat and is pressed against it by the energy's gradient there. */
+bool seat_binds(const struct mesh *mesh, const double (*u_mm)[3], const double (*force_N)[3],
+                int n);
+
+/* Sum of phi over the nodes with the lagged normal forces, N mm. */
+double seat_energy(const struct seat *seat, const double (*u_mm)[3]);
+
+/* Adds the friction forces for the given normal forces [node] to force_N[node]. */
+void seat_add_force(const struct seat *seat, const double *normal_N, const double (*u_mm)[3],
+                    double (*force_N)[3]);
+
+/* Hessian of seat_energy with respect to x and y of one node that presses on the seat, N/mm. */
+void seat_hessian(const struct seat *seat, const double (*u_mm)[3], int node, double ret[2][2]);
+
+/* Adds the Hessian of seat_energy to the values of assembly->linear. */
+void seat_add_stiffness(const struct seat *seat, const struct assembly *assembly,
+                        const double (*u_mm)[3]);
+
+/*
+ * change_N[equation] holds the change of the forces that an increment makes without friction; its
+ * entries at slipping nodes' z are changes of normal forces. Adds what they do to friction.
+ */
+void seat_add_normal_change(const struct seat *seat, const struct assembly *assembly,
+                            const double (*u_mm)[3], double *change_N);
+
+/*
+ * Ends a load step: anchors of slipping nodes follow, those of nodes off the seat move along.
+ * Returns the energy dissipated by the slip, N mm.
+ */
+double seat_advance(struct seat *seat, const double (*u_mm)[3]);
+
+#endif

@@ -1,0 +1,149 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What `ischia` promises about whole solves: convergence, determinism, resolution, domain.
+
+usage: test_solves.py ISCHIA CLASS [unittest arguments]   CLASS: Quick, or one of those that take
+       minutes: Cohort, Corners, Resolution, Domain
+"""
+import csv
+import itertools
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+KEYS = ("R1", "R2", "eM", "eF", "muM", "muF", "F")
+COLUMNS = ("R1_mm", "R2_mm", "eM_mm", "eF_mm", "muM_kPa", "muF_kPa", "F_N")
+ISCHIA = None
+# Factorial levels of Table 1 of Macron et al. (2020); its F is the quarter model's.
+LEVELS = ((5, 7, 9), (15, 39, 63), (19, 29, 39), (9, 22, 35), (1, 4.5, 8), (2.8, 5.4, 8),
+          (4 * 48, 4 * 77.5, 4 * 107))
+
+
+def ischia(*arguments, stdin=""):
+    return subprocess.run([ISCHIA, *arguments], input=stdin, capture_output=True, text=True,
+                          env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}, check=False)
+
+
+def table2():
+    """{"1R": {"R1": 6.9, ...}, ...}"""
+    with open(ROOT / "examples/table2.csv", newline="", encoding="utf-8") as file:
+        return {row["subject"].removeprefix("table2-") + row["side"][0].upper():
+                {k: float(row[c]) for k, c in zip(KEYS, COLUMNS)} for row in csv.DictReader(file)}
+
+
+def solve(side, **options):
+    done = ischia("solve", "-", stdin=json.dumps({**side, **options}))
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def cohort(rows, jobs):
+    """The result rows of `ischia cohort` over these parameter rows, as dictionaries."""
+    with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+        file.write("\n".join(",".join(str(x) for x in row) for row in [KEYS, *rows]) + "\n")
+        file.flush()
+        done = ischia("cohort", file.name, "-j", str(jobs))
+    return list(csv.DictReader(done.stdout.splitlines())), done
+
+
+def numbers(result):
+    """The result without what a clock measured."""
+    kept = json.loads(json.dumps(result))
+    for key in ("wall_s", "cpu_s"):
+        kept["numerics"].pop(key, None)
+    return kept
+
+
+class Quick(unittest.TestCase):
+    def test_three_sides_converge_to_what_is_promised(self):
+        for name in ("1R", "7L", "9L"):
+            with self.subTest(side=name):
+                numerics = solve(table2()[name])["numerics"]
+                self.assertTrue(numerics["converged"])
+                self.assertLessEqual(numerics["force_residual"], 1e-8)
+                self.assertLessEqual(numerics["energy_residual"], 0.005)
+
+    def test_the_same_input_gives_the_same_bits(self):
+        first, second = (numbers(solve(table2()["1R"])) for _ in range(2))
+        self.assertEqual(first, second)
+
+    def test_neighbours_and_jobs_do_not_change_a_row(self):
+        rows = [[table2()[name][k] for k in KEYS] for name in ("1R", "7L", "9L")]
+        runs = []
+        for order, jobs in ((rows, 1), (rows, 2), (rows[::-1], 1)):
+            found, done = cohort(order, jobs)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            runs.append(sorted(tuple(v for k, v in row.items() if k != "wall_s") for row in found))
+        self.assertEqual(runs[0], runs[1])
+        self.assertEqual(runs[0], runs[2])
+
+    def test_strain_and_travel_grow_with_the_force(self):
+        results = [solve({**table2()["1R"], "F": F}) for F in (50, 100, 196)]
+        for key, part in (("eps_max", "strain"), ("displacement_mm", "seat")):
+            values = [r[part][key] for r in results]
+            self.assertEqual(values, sorted(values))
+
+
+class Cohort(unittest.TestCase):
+    def test_every_side_of_table_2_converges(self):
+        rows = [[side[k] for k in KEYS] for side in table2().values()]
+        found, done = cohort(rows, os.cpu_count())
+        self.assertEqual(len(found), 26)
+        failed = [row for row in found if row["status"] != "succeeded"]
+        self.assertEqual(failed, [], done.stderr)
+
+
+class Corners(unittest.TestCase):
+    def test_corners_and_centre_of_table_1(self):
+        corners = [list(c) for c in itertools.product(*((low, high) for low, _, high in LEVELS))]
+        found, _ = cohort(corners + [[middle for _, middle, _ in LEVELS]], os.cpu_count())
+        self.assertEqual(len(found), 129)
+        failed = [row for row in found if row["status"] != "succeeded"]
+        for row in failed:
+            print("failed:", *(f"{k}={row[k]}" for k in KEYS), row["reason"])
+        self.assertLessEqual(len(failed), 5)
+        self.assertEqual({float(row["muM"]) for row in failed} - {1.0}, set())
+
+
+class Resolution(unittest.TestCase):
+    """Three resolutions of six sides. The extrapolated value is Richardson's with second order."""
+    DIVISIONS = {"coarse": 6, "standard": 12, "fine": 18}
+
+    def test_standard_is_within_a_percent_and_says_its_error(self):
+        covered = 0
+        for name in ("1R", "7L", "8L", "9R", "10R", "12R"):
+            eps = {r: solve(table2()[name], resolution=r) for r in self.DIVISIONS}
+            value = {r: e["strain"]["eps_max"] for r, e in eps.items()}
+            h2 = {r: 1 / n ** 2 for r, n in self.DIVISIONS.items()}
+            limit = value["fine"] + (value["fine"] - value["standard"]) * \
+                h2["fine"] / (h2["standard"] - h2["fine"])
+            error = abs(value["standard"] - limit)
+            said = eps["standard"]["numerics"]["eps_max_error"]
+            covered += error <= said
+            print(f"{name}: " + ", ".join(f"{r} {v:.4f}" for r, v in value.items()) +
+                  f", limit {limit:.4f}, standard is {100 * error / limit:.2f} % off, said {said:.4f}")
+            if table2()[name]["muM"] >= 2:
+                self.assertLess(error / limit, 0.01)
+        self.assertGreaterEqual(covered, 5)
+
+
+class Domain(unittest.TestCase):
+    def test_a_wider_box_lowers_eps_max_a_little(self):
+        for name in ("1R", "9L", "10R"):
+            values = [solve(table2()[name], model={"L_over_h": ratio})["strain"]["eps_max"]
+                      for ratio in (2, 3, 4)]
+            print(f"{name}: L/h 2, 3, 4: " + ", ".join(f"{v:.4f}" for v in values))
+            self.assertTrue(all(math.isfinite(v) for v in values))
+            self.assertLess(abs(values[2] / values[0] - 1), 0.10)
+            self.assertLess(abs(values[2] - values[1]), abs(values[1] - values[0]))
+
+
+if __name__ == "__main__":
+    ISCHIA = sys.argv.pop(1)
+    unittest.main()
