@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SERVER_CLI_CREW_H
+#define ISCHIA_SERVER_CLI_CREW_H
+
+#include <stdbool.h>
+#include <sys/types.h>
+
+#include "solver/case.h"
+#include "solver/error.h"
+#include "solver/result.h"
+
+/*
+ * Processes that solve cases side by side, each with its own solver. A member that dies (killed,
+ * out of memory, a crash) costs its one case: the case is answered as failed and a new member
+ * takes its place.
+ */
+enum { CREW_MEMBERS_MAX = 256 };
+
+struct crew_member {
+    pid_t pid;
+    int fd;   /* our end of a socket pair        */
+    long job; /* what it works on, -1: nothing   */
+};
+
+struct crew {
+    int count;
+    struct crew_member member[CREW_MEMBERS_MAX];
+};
+
+struct crew_answer {
+    long job;
+    enum ischia_code code; /* ISCHIA_OK: result holds the end of the solve, converged or not */
+    char message[ISCHIA_ERROR_MESSAGE_BYTES]; /* unless ISCHIA_OK */
+    struct ischia_result result;
+};
+
+/* Starts count processes (1 ... CREW_MEMBERS_MAX). ISCHIA_E_IO when one cannot be started. */
+ISCHIA_MUST_CHECK enum ischia_code crew_start(struct crew *ret, int count,
+                                              struct ischia_error *err);
+void crew_stop(struct crew *crew); /* ends them all, working or not */
+
+bool crew_has_idle(const struct crew *crew);
+bool crew_is_working(const struct crew *crew);
+
+/* Gives a case to an idle member (there is one, asserted). job: 0 or more, the caller's number. */
+ISCHIA_MUST_CHECK enum ischia_code crew_give(struct crew *crew, long job,
+                                             const struct ischia_case *c, struct ischia_error *err);
+
+/* Waits for the next answer (somebody is working, asserted). */
+ISCHIA_MUST_CHECK enum ischia_code crew_wait(struct crew *crew, struct crew_answer *ret,
+                                             struct ischia_error *err);
+
+#endif

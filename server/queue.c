@@ -1,0 +1,455 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "server/queue.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/problem_doc.h"
+#include "api/result_doc.h"
+#include "server/digest.h"
+
+enum { EVENTS_AGE_MS = 60 * 1000 };
+
+/* What is to be written about a job that has ended. */
+struct verdict {
+    struct uuid id;
+    int64_t attempt;
+    enum queue_state to; /* succeeded, failed, or queued again */
+    bool crashed;        /* queued again because its worker died */
+    char *document;      /* result or problem */
+    unsigned char *field;
+    size_t field_size;
+    enum pool_end end; /* for the watcher, as the two that follow */
+    int64_t wall_ms;
+    char detail[160];
+    struct verdict *next; /* waiting for the store */
+};
+
+struct queue {
+    struct store *store;
+    struct events *events;
+    struct pool *pool;
+    int queued_max, crashes_max;
+    struct queue_watcher watcher;
+    atomic_bool draining;
+    pthread_mutex_t lock; /* guards on_the_way */
+    pthread_cond_t arrived;
+    int on_the_way;                    /* requests that the store has not answered yet */
+    struct verdict *owed, **last_owed; /* the pool's thread alone */
+};
+
+void queue_case_key(const char *case_json, unsigned char ret_key[STORE_DIGEST_BYTES])
+{
+    static const unsigned char version[2] = {ISCHIA_MODEL_VERSION & 0xff,
+                                             ISCHIA_MODEL_VERSION >> 8};
+    const struct digest_part parts[] = {
+        digest_text(case_json), digest_text(ISCHIA_MODEL_NAME), {version, sizeof version}};
+    digest_parts(parts, sizeof parts / sizeof parts[0], ret_key);
+}
+
+static void report_store_error(struct queue *queue, const struct ischia_error *err)
+{
+    if (queue->watcher.on_store_error != NULL)
+        queue->watcher.on_store_error(queue->watcher.context, err);
+}
+
+static void publish_state(struct queue *queue, const struct uuid *id, enum queue_state state)
+{
+    const bool final = queue_is_final(state);
+    const struct event event = {.kind = final ? EVENT_DONE : EVENT_STATE,
+                                .state = state,
+                                .fraction = state == QUEUE_SUCCEEDED ? 1.0 : 0.0};
+    events_publish(queue->events, id, &event);
+}
+
+/* ------------------------------------------------------------------------------ verdicts */
+
+static void verdict_finish(struct verdict *verdict)
+{
+    free(verdict->document);
+    free(verdict->field);
+}
+
+static void announce(struct queue *queue, const struct verdict *verdict)
+{
+    publish_state(queue, &verdict->id, verdict->to);
+    if (queue_is_final(verdict->to) && queue->watcher.on_finished != NULL)
+        queue->watcher.on_finished(queue->watcher.context, &verdict->id, verdict->to, verdict->end,
+                                   verdict->wall_ms, verdict->detail);
+}
+
+static enum ischia_code write_verdict(struct queue *queue, const struct verdict *v,
+                                      enum store_answer *ret_answer, struct ischia_error *err)
+{
+    switch (v->to) {
+    case QUEUE_SUCCEEDED:
+        return store_succeed(queue->store, &v->id, v->attempt, v->document, v->field, v->field_size,
+                             ret_answer, err);
+    case QUEUE_FAILED:
+        return store_fail(queue->store, &v->id, v->attempt, v->document, ret_answer, err);
+    default:
+        return store_requeue(queue->store, &v->id, v->attempt, v->crashed, ret_answer, err);
+    }
+}
+
+/* False when the store could not take it now. STORE_CONFLICT: it was cancelled, or restored from a
+ * backup, meanwhile: what the worker found is no longer wanted. */
+static bool settle(struct queue *queue, const struct verdict *verdict)
+{
+    struct ischia_error err = {0};
+    enum store_answer answer = STORE_CONFLICT;
+    if (write_verdict(queue, verdict, &answer, &err) != ISCHIA_OK) {
+        report_store_error(queue, &err);
+        return false;
+    }
+    if (answer == STORE_DONE) announce(queue, verdict);
+    return true;
+}
+
+/* Keeps it for later. When there is not even memory for that the job stays `running` in the store
+ * and is solved again after the next start. */
+static void owe(struct queue *queue, struct verdict *verdict)
+{
+    struct verdict *copy = malloc(sizeof *copy);
+    if (copy == NULL) {
+        verdict_finish(verdict);
+        return;
+    }
+    *copy = *verdict;
+    copy->next = NULL;
+    *queue->last_owed = copy;
+    queue->last_owed = &copy->next;
+}
+
+/* False while the store takes nothing. */
+static bool pay_what_is_owed(struct queue *queue)
+{
+    while (queue->owed != NULL) {
+        struct verdict *verdict = queue->owed;
+        if (!settle(queue, verdict)) return false;
+        queue->owed = verdict->next;
+        if (queue->owed == NULL) queue->last_owed = &queue->owed;
+        verdict_finish(verdict);
+        free(verdict);
+    }
+    return true;
+}
+
+/* Takes over what *verdict owns. */
+static void settle_or_owe(struct queue *queue, struct verdict *verdict)
+{
+    if (settle(queue, verdict))
+        verdict_finish(verdict);
+    else
+        owe(queue, verdict);
+}
+
+/* ------------------------------------------------------------------- judging an outcome */
+
+static bool result_holds(const char *document)
+{
+    struct ischia_result result;
+    struct result_model model;
+    struct ischia_error err;
+    return result_doc_read(&result, &model, document, strlen(document), &json_limits_stored,
+                           &err) == ISCHIA_OK &&
+           ischia_result_converged(&result) && ischia_result_is_valid(&result) &&
+           strcmp(model.name, ISCHIA_MODEL_NAME) == 0 && model.version == ISCHIA_MODEL_VERSION;
+}
+
+static bool problem_holds(const char *document)
+{
+    struct problem problem;
+    struct ischia_error err;
+    return problem_doc_read(&problem, document, strlen(document), &err) == ISCHIA_OK;
+}
+
+/* Fails the job with a problem of our own; without memory for one it goes back into the queue. */
+static void fail_with(struct verdict *verdict, enum problem_kind kind, const char *detail)
+{
+    struct problem problem;
+    struct ischia_error err;
+    problem_init(&problem, kind, "%s", detail);
+    const bool written = problem_doc_text(&verdict->document, &problem, &err) == ISCHIA_OK;
+    verdict->to = written ? QUEUE_FAILED : QUEUE_QUEUED;
+}
+
+static void judge_crash(const struct queue *queue, const struct pool_job *job, const char *detail,
+                        struct verdict *verdict)
+{
+    if (job->crashes < queue->crashes_max) {
+        verdict->to = QUEUE_QUEUED;
+        verdict->crashed = true;
+        return;
+    }
+    char words[sizeof verdict->detail + 120];
+    (void)snprintf(words, sizeof words, "the worker that solved it: %s%s", detail,
+                   job->crashes > 0 ? "; the attempt before ended in the same way or alike" : "");
+    fail_with(verdict, PROBLEM_WORKER_DIED, words);
+}
+
+static bool copy_document(struct verdict *verdict, const struct pool_outcome *outcome)
+{
+    verdict->document = strdup(outcome->document);
+    verdict->field = malloc(outcome->field_size > 0 ? outcome->field_size : 1);
+    if (verdict->document == NULL || verdict->field == NULL) return false;
+    if (outcome->field_size > 0) memcpy(verdict->field, outcome->field, outcome->field_size);
+    verdict->field_size = outcome->field_size;
+    return true;
+}
+
+static void judge_answer(const struct queue *queue, const struct pool_job *job,
+                         const struct pool_outcome *outcome, struct verdict *verdict)
+{
+    const bool solved = outcome->end == POOL_RESULT;
+    const bool holds = solved ? result_holds(outcome->document) : problem_holds(outcome->document);
+    if (!holds) {
+        judge_crash(queue, job, "the worker's answer did not hold what it must", verdict);
+    } else if (copy_document(verdict, outcome)) {
+        verdict->to = solved ? QUEUE_SUCCEEDED : QUEUE_FAILED;
+    } else { /* no memory now: solve it again later */
+        verdict_finish(verdict);
+        verdict->document = NULL;
+        verdict->field = NULL;
+        verdict->to = QUEUE_QUEUED;
+    }
+}
+
+static void on_outcome(void *context, const struct pool_job *job,
+                       const struct pool_outcome *outcome)
+{
+    struct queue *queue = context;
+    struct verdict verdict = {.id = job->id,
+                              .attempt = job->attempt,
+                              .to = QUEUE_QUEUED,
+                              .end = outcome->end,
+                              .wall_ms = outcome->wall_ms};
+    (void)snprintf(verdict.detail, sizeof verdict.detail, "%.*s", (int)sizeof verdict.detail - 1,
+                   outcome->detail);
+    switch (outcome->end) {
+    case POOL_RESULT:
+    case POOL_PROBLEM:
+        judge_answer(queue, job, outcome, &verdict);
+        break;
+    case POOL_CRASHED:
+        judge_crash(queue, job, verdict.detail, &verdict);
+        break;
+    case POOL_DEADLINE:
+        fail_with(&verdict, PROBLEM_TIME_LIMIT, verdict.detail);
+        break;
+    /* drained: back into the queue. Cancelled: the store refuses that, being there before us. */
+    default:
+        break;
+    }
+    settle_or_owe(queue, &verdict);
+}
+
+/* --------------------------------------------------------------------------- giving jobs */
+
+static void on_cached(void *context, const struct uuid *id)
+{
+    publish_state(context, id, QUEUE_SUCCEEDED);
+}
+
+static bool next_job(void *context, struct pool_job *ret)
+{
+    struct queue *queue = context;
+    struct store_claim claim = {0};
+    struct ischia_error err = {0};
+    enum store_answer answer = STORE_NOT_FOUND;
+    if (!pay_what_is_owed(queue)) return false; /* a solve that cannot be kept is a waste */
+    if (store_claim_next(queue->store, on_cached, queue, &claim, &answer, &err) != ISCHIA_OK) {
+        report_store_error(queue, &err);
+        return false;
+    }
+    if (answer != STORE_DONE) return false;
+    publish_state(queue, &claim.id, QUEUE_RUNNING);
+    *ret = (struct pool_job){.id = claim.id,
+                             .attempt = claim.attempt,
+                             .crashes = claim.crashes,
+                             .case_json = claim.case_json};
+    return true;
+}
+
+static void on_progress(void *context, const struct pool_job *job,
+                        const struct pool_progress *progress)
+{
+    struct queue *queue = context;
+    struct event event = {.kind = EVENT_PROGRESS,
+                          .state = QUEUE_RUNNING,
+                          .fraction = progress->fraction,
+                          .load_step = progress->load_step,
+                          .newton_iteration = progress->newton_iteration,
+                          .F_N = progress->F_N};
+    (void)snprintf(event.message, sizeof event.message, "%s", progress->message);
+    events_publish(queue->events, &job->id, &event);
+}
+
+static void on_note(void *context, const struct pool_note *note)
+{
+    struct queue *queue = context;
+    if (queue->watcher.on_note != NULL) queue->watcher.on_note(queue->watcher.context, note);
+}
+
+static void on_tick(void *context)
+{
+    struct queue *queue = context;
+    (void)pay_what_is_owed(queue);
+    events_sweep(queue->events, EVENTS_AGE_MS);
+}
+
+/* ----------------------------------------------------------------------- create, destroy */
+
+static void free_queue(struct queue *queue)
+{
+    while (queue->owed != NULL) {
+        struct verdict *verdict = queue->owed;
+        queue->owed = verdict->next;
+        verdict_finish(verdict);
+        free(verdict);
+    }
+    (void)pthread_cond_destroy(&queue->arrived);
+    (void)pthread_mutex_destroy(&queue->lock);
+    free(queue);
+}
+
+static enum ischia_code start(struct queue *queue, const struct pool_options *options,
+                              struct ischia_error *err)
+{
+    const struct pool_host host = {.context = queue,
+                                   .next_job = next_job,
+                                   .on_progress = on_progress,
+                                   .on_outcome = on_outcome,
+                                   .on_note = on_note,
+                                   .on_tick = on_tick};
+    int requeued;
+    TRY(store_recover(queue->store, &requeued, err));
+    return pool_create(options, &host, &queue->pool, err);
+}
+
+enum ischia_code queue_create(struct store *store, struct events *events,
+                              const struct queue_options *options,
+                              const struct queue_watcher *watcher, struct queue **ret_queue,
+                              struct ischia_error *err)
+{
+    struct queue *queue = calloc(1, sizeof *queue);
+    CHECK(queue != NULL, err, ISCHIA_E_MEMORY, "no memory for the queue");
+    queue->store = store;
+    queue->events = events;
+    queue->queued_max = options->queued_max;
+    queue->crashes_max = options->crashes_max == 0 ? 1 : options->crashes_max;
+    queue->last_owed = &queue->owed;
+    (void)pthread_mutex_init(&queue->lock, NULL);
+    (void)pthread_cond_init(&queue->arrived, NULL);
+    if (watcher != NULL) queue->watcher = *watcher;
+    const enum ischia_code code = start(queue, &options->pool, err);
+    if (code != ISCHIA_OK) {
+        free_queue(queue);
+        return code;
+    }
+    *ret_queue = queue;
+    return ISCHIA_OK;
+}
+
+/* Counts the requests whose answer will still use the queue. */
+static void on_the_way(struct queue *queue, int change)
+{
+    (void)pthread_mutex_lock(&queue->lock);
+    queue->on_the_way += change;
+    (void)pthread_cond_broadcast(&queue->arrived);
+    (void)pthread_mutex_unlock(&queue->lock);
+}
+
+static void wait_for_arrivals(struct queue *queue)
+{
+    (void)pthread_mutex_lock(&queue->lock);
+    while (queue->on_the_way > 0) (void)pthread_cond_wait(&queue->arrived, &queue->lock);
+    (void)pthread_mutex_unlock(&queue->lock);
+}
+
+void queue_drain(struct queue *queue)
+{
+    atomic_store(&queue->draining, true);
+    pool_drain(queue->pool);
+}
+
+void queue_destroy(struct queue *queue, int grace_ms)
+{
+    if (queue == NULL) return;
+    atomic_store(&queue->draining, true);
+    wait_for_arrivals(queue);
+    pool_destroy(queue->pool, grace_ms);
+    (void)pay_what_is_owed(queue);
+    free_queue(queue);
+}
+
+struct pool *queue_pool(struct queue *queue) { return queue->pool; }
+
+/* ----------------------------------------------------------------------------- customers */
+
+static enum ischia_code complete(const struct queue *queue, const struct store_new *what,
+                                 struct store_new *ret, struct ischia_error *err)
+{
+    CHECK(!atomic_load(&queue->draining), err, ISCHIA_E_STATE, "the daemon is stopping");
+    *ret = *what;
+    ret->queued_max = queue->queued_max;
+    queue_case_key(what->case_json, ret->case_key);
+    return ISCHIA_OK;
+}
+
+enum ischia_code queue_accept(struct queue *queue, const struct store_new *what,
+                              struct store_accepted *ret, struct ischia_error *err)
+{
+    struct store_new whole;
+    TRY(complete(queue, what, &whole, err));
+    TRY(store_accept(queue->store, &whole, ret, err));
+    if (ret->acceptance == STORE_ACCEPTED) pool_wake(queue->pool);
+    return ISCHIA_OK;
+}
+
+struct accept_later {
+    struct queue *queue;
+    store_accept_done *done;
+    void *context;
+};
+
+static void on_accepted(void *context, enum ischia_code code, const struct store_accepted *accepted,
+                        const struct ischia_error *err)
+{
+    struct accept_later *later = context;
+    struct queue *queue = later->queue;
+    if (code == ISCHIA_OK && accepted->acceptance == STORE_ACCEPTED) pool_wake(queue->pool);
+    later->done(later->context, code, accepted, err);
+    free(later);
+    on_the_way(queue, -1);
+}
+
+enum ischia_code queue_accept_later(struct queue *queue, const struct store_new *what,
+                                    store_accept_done *done, void *context,
+                                    struct ischia_error *err)
+{
+    struct store_new whole;
+    TRY(complete(queue, what, &whole, err));
+    struct accept_later *later = malloc(sizeof *later);
+    CHECK(later != NULL, err, ISCHIA_E_MEMORY, "no memory for a request");
+    *later = (struct accept_later){queue, done, context};
+    on_the_way(queue, 1);
+    const enum ischia_code code = store_accept_later(queue->store, &whole, on_accepted, later, err);
+    if (code == ISCHIA_OK) return ISCHIA_OK;
+    free(later);
+    on_the_way(queue, -1);
+    return code;
+}
+
+enum ischia_code queue_cancel(struct queue *queue, const struct uuid *id, enum queue_state *ret_was,
+                              enum store_answer *ret_answer, struct ischia_error *err)
+{
+    TRY(store_cancel(queue->store, id, ret_was, ret_answer, err));
+    if (*ret_answer != STORE_DONE) return ISCHIA_OK;
+    if (*ret_was == QUEUE_RUNNING) pool_cancel(queue->pool, id);
+    publish_state(queue, id, QUEUE_CANCELLED);
+    return ISCHIA_OK;
+}

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SERVER_QUEUE_H
+#define ISCHIA_SERVER_QUEUE_H
+
+#include "server/events.h"
+#include "server/pool.h"
+#include "server/queue_state.h"
+#include "server/store/store.h"
+
+/*
+ * The queue ties store, pool and events together: what is durable is in the store, what runs is in
+ * the pool, what people watch is in events. It holds the rules of docs/INVARIANTS.md: nothing
+ * accepted is lost, nothing ends twice, nothing stays stuck.
+ *
+ * A worker's death on a job is retried once and then fails the job with the reason. A job over its
+ * deadline fails at once: the same case takes the same time again. When the store cannot take an
+ * outcome (disk full) the queue keeps it and offers it again, and claims nothing meanwhile.
+ */
+
+struct queue;
+
+struct queue_options {
+    struct pool_options pool;
+    int queued_max;  /* more are refused with STORE_FULL; 0: no limit                       */
+    int crashes_max; /* worker deaths that a job survives; < 0: none; 0: 1                  */
+};
+
+/* For logs and metrics; called on the pool's thread, any may be NULL. None of the texts identifies
+ * a person. */
+struct queue_watcher {
+    void *context;
+    void (*on_note)(void *context, const struct pool_note *note);
+    void (*on_finished)(void *context, const struct uuid *id, enum queue_state state,
+                        enum pool_end end, int64_t wall_ms, const char *detail);
+    void (*on_store_error)(void *context, const struct ischia_error *err);
+};
+
+/* Recovers what was running when the last daemon died, starts the pool. store and events stay the
+ * caller's and must outlive the queue. */
+ISCHIA_MUST_CHECK enum ischia_code queue_create(struct store *store, struct events *events,
+                                                const struct queue_options *options,
+                                                const struct queue_watcher *watcher,
+                                                struct queue **ret_queue, struct ischia_error *err);
+
+/* The identity of a solve: equal keys give equal results. Over the canonical case text, the model's
+ * name and version. */
+void queue_case_key(const char *case_json, unsigned char ret_key[STORE_DIGEST_BYTES]);
+
+/* store_accept / store_accept_later, and the workers are woken. what->queued_max and case_key are
+ * filled in here. After queue_drain: ISCHIA_E_STATE. */
+ISCHIA_MUST_CHECK enum ischia_code queue_accept(struct queue *queue, const struct store_new *what,
+                                                struct store_accepted *ret,
+                                                struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code
+queue_accept_later(struct queue *queue, const struct store_new *what, store_accept_done *done,
+                   void *context, struct ischia_error *err);
+
+/* Cancels durably, then ends the worker. STORE_CONFLICT when it has ended already (*ret_was). */
+ISCHIA_MUST_CHECK enum ischia_code
+queue_cancel(struct queue *queue, const struct uuid *id, enum queue_state *ret_was,
+             enum store_answer *ret_answer, struct ischia_error *err);
+
+struct pool *queue_pool(struct queue *queue); /* for renders and stats */
+
+/* Accepts and starts nothing more; running solves go on. Does not wait. */
+void queue_drain(struct queue *queue);
+
+/* Drains; running solves have grace_ms to end, then they are put back into the queue. NULL allowed. */
+void queue_destroy(struct queue *queue, int grace_ms);
+
+#endif
