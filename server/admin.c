@@ -19,7 +19,8 @@ const char admin_help[] =
     "  token revoke ID       Makes a token invalid within a second.\n"
     "  audit verify          Checks the chain of the audit log and prints its head.\n"
     "  audit list            Prints the audit log.\n"
-    "  backup FILE           Copies the whole store into a new file, while the daemon runs or not.\n"
+    "  backup FILE           Copies the whole store into a new file, while the daemon runs or "
+    "not.\n"
     "  restore FILE          Replaces the content of the store by that of a backup.\n";
 
 static int complain(const struct ischia_error *err)
@@ -91,7 +92,8 @@ static enum ischia_code token_create(struct store *store, char *const *words, in
     for (int i = 0; i < count; i++) TRY(parse_wish(&wish, words[i], err));
     TRY(auth_token_create(store, wish.scopes, wish.expires_ms, wish.name, token, err));
     (void)printf("%s\n", token);
-    (void)fprintf(stderr, "This is shown once: keep it now. Send it as `Authorization: Bearer …`.\n");
+    (void)fprintf(stderr,
+                  "This is shown once: keep it now. Send it as `Authorization: Bearer …`.\n");
     return ISCHIA_OK;
 }
 

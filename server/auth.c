@@ -73,9 +73,9 @@ static bool keep_token(void *context, const struct store_token *token)
 {
     struct token_list *list = context;
     if (token->revoked_ms != 0) return true;
-    struct store_token *grown =
-        list->count < AUTH_TOKENS_MAX ? realloc(list->token, (list->count + 1) * sizeof *grown)
-                                      : NULL;
+    struct store_token *grown = list->count < AUTH_TOKENS_MAX
+                                    ? realloc(list->token, (list->count + 1) * sizeof *grown)
+                                    : NULL;
     if (grown == NULL) {
         list->failed = true;
         return false;
@@ -92,8 +92,10 @@ static enum ischia_code read_tokens(struct store *store, struct token_list *ret,
     enum ischia_code code = store_token_list(store, keep_token, &list, err);
     if (code == ISCHIA_OK && list.failed)
         code = FAIL(err, ISCHIA_E_LIMIT, "no room for the tokens; at most %d", AUTH_TOKENS_MAX);
-    if (code == ISCHIA_OK) *ret = list;
-    else free(list.token);
+    if (code == ISCHIA_OK)
+        *ret = list;
+    else
+        free(list.token);
     return code;
 }
 
@@ -195,7 +197,7 @@ static bool split_token(const char *token, char ret_id[AUTH_ID_BYTES], const cha
 
 /* Compares the hash with every token's, so that the time does not tell which ids exist. */
 static const struct store_token *match_token(const struct auth *auth, const char *id,
-                                       const unsigned char hash[HASH_BYTES])
+                                             const unsigned char hash[HASH_BYTES])
 {
     const struct store_token *found = NULL;
     for (size_t i = 0; i < auth->list.count; i++) {
@@ -232,8 +234,10 @@ enum auth_verdict auth_check(struct auth *auth, const char *header, int64_t now_
     *ret_identity = (struct auth_identity){.id = "-", .scopes = 0};
     refresh(auth);
     (void)pthread_rwlock_rdlock(&auth->lock);
-    if (auth->list.count == 0) ret_identity->scopes = AUTH_ALL;
-    else verdict = judge(auth, header, now_ms, ret_identity);
+    if (auth->list.count == 0)
+        ret_identity->scopes = AUTH_ALL;
+    else
+        verdict = judge(auth, header, now_ms, ret_identity);
     (void)pthread_rwlock_unlock(&auth->lock);
     return verdict;
 }
@@ -250,7 +254,8 @@ enum ischia_code auth_token_create(struct store *store, unsigned scopes, int64_t
     CHECK(strlen(name) < sizeof token.name, err, ISCHIA_E_INPUT,
           "the name is longer than %zu bytes", sizeof token.name - 1);
     for (const char *c = name; *c != '\0'; c++)
-        CHECK(!iscntrl((unsigned char)*c), err, ISCHIA_E_INPUT, "the name holds a control character");
+        CHECK(!iscntrl((unsigned char)*c), err, ISCHIA_E_INPUT,
+              "the name holds a control character");
     randombytes_buf(id, sizeof id);
     randombytes_buf(secret, sizeof secret);
     (void)sodium_bin2hex(token.id, AUTH_ID_BYTES, id, sizeof id);

@@ -59,10 +59,9 @@ unsigned auth_parse_scopes(const char *text);
 
 /* The administration commands. create returns the whole token, which is nowhere else. expires_ms 0:
  * never. name: what it is for. ISCHIA_E_STATE when an id to revoke does not exist. */
-ISCHIA_MUST_CHECK enum ischia_code auth_token_create(struct store *store, unsigned scopes,
-                                                     int64_t expires_ms, const char *name,
-                                                     char ret_token[AUTH_TOKEN_BYTES],
-                                                     struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code
+auth_token_create(struct store *store, unsigned scopes, int64_t expires_ms, const char *name,
+                  char ret_token[AUTH_TOKEN_BYTES], struct ischia_error *err);
 ISCHIA_MUST_CHECK enum ischia_code auth_token_list(struct store *store, FILE *out,
                                                    struct ischia_error *err);
 ISCHIA_MUST_CHECK enum ischia_code auth_token_revoke(struct store *store, const char *id,

@@ -12,21 +12,30 @@
 static const char *const audit_choices[] = {"off", "changes", "all", NULL};
 
 #define TEXT(field, preset, help)                                                                  \
-    {#field, CONFIG_TEXT, "", 0, 0, preset, NULL, false, offsetof(struct config, field), help}
+    {                                                                                              \
+#field, CONFIG_TEXT, "", 0, 0, preset, NULL, false, offsetof(struct config, field), help   \
+    }
 #define NUMBER(name, field, unit, min, max, preset, reload, help)                                  \
-    {name, CONFIG_INTEGER, unit, min, max, preset, NULL, reload, offsetof(struct config, field),   \
-     help}
+    {                                                                                              \
+        name, CONFIG_INTEGER, unit, min, max, preset, NULL, reload,                                \
+            offsetof(struct config, field), help                                                   \
+    }
 #define SWITCH(field, preset, help)                                                                \
-    {#field, CONFIG_BOOLEAN, "", 0, 1, preset, NULL, false, offsetof(struct config, field), help}
+    {                                                                                              \
+#field, CONFIG_BOOLEAN, "", 0, 1, preset, NULL, false, offsetof(struct config, field),     \
+            help                                                                                   \
+    }
 #define CHOICE(field, words, preset, reload, help)                                                 \
-    {#field, CONFIG_CHOICE, "", 0, 0, preset, words, reload, offsetof(struct config, field), help}
+    {                                                                                              \
+#field, CONFIG_CHOICE, "", 0, 0, preset, words, reload, offsetof(struct config, field),    \
+            help                                                                                   \
+    }
 
 const struct config_option config_options[] = {
     TEXT(listen, "127.0.0.1:8080",
          "Address and port to answer on; port 0 takes a free one. Anything but the loopback "
          "address needs tokens and TLS, or behind_proxy."),
-    TEXT(state_dir, "/var/lib/ischia",
-         "Directory of the database; nothing else is written."),
+    TEXT(state_dir, "/var/lib/ischia", "Directory of the database; nothing else is written."),
     TEXT(store, "", "Where the store is; empty: in the state directory."),
     NUMBER("workers", workers, "processes", 0, 1024, "0", false,
            "Worker processes that solve side by side; 0: one a processor core."),
@@ -128,7 +137,7 @@ static enum ischia_code set_boolean(struct config *config, const struct config_o
     static const struct {
         const char *word;
         bool value;
-    } words[] = {{"true", true}, {"yes", true}, {"on", true}, {"1", true},
+    } words[] = {{"true", true},   {"yes", true}, {"on", true},   {"1", true},
                  {"false", false}, {"no", false}, {"off", false}, {"0", false}};
     for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
         if (strcmp(value, words[i].word) != 0) continue;
@@ -233,8 +242,7 @@ enum ischia_code config_set(struct config *config, const char *name, const char 
     const struct config_option *option = find_option(name);
     if (option != NULL) return set_option(config, option, value, err);
     const char *nearest = nearest_name(name);
-    if (nearest[0] == '\0')
-        return FAIL(err, ISCHIA_E_INPUT, "no option is called '%.48s'", name);
+    if (nearest[0] == '\0') return FAIL(err, ISCHIA_E_INPUT, "no option is called '%.48s'", name);
     return FAIL(err, ISCHIA_E_INPUT, "no option is called '%.48s'; did you mean '%s'?", name,
                 nearest);
 }
@@ -299,8 +307,7 @@ enum ischia_code config_parse(struct config *config, const char *text, size_t si
     return ISCHIA_OK;
 }
 
-enum ischia_code config_read_file(struct config *config, const char *path,
-                                  struct ischia_error *err)
+enum ischia_code config_read_file(struct config *config, const char *path, struct ischia_error *err)
 {
     enum { LARGEST_BYTES = 65536 };
     FILE *file = fopen(path, "re");
@@ -353,8 +360,7 @@ enum ischia_code config_read_environment(struct config *config, char *const *env
         struct ischia_error cause;
         const char *value = NULL, *variable = *environment;
         if (strncmp(variable, prefix, sizeof prefix - 1) != 0) continue;
-        const struct config_option *option =
-            variable_option(variable + sizeof prefix - 1, &value);
+        const struct config_option *option = variable_option(variable + sizeof prefix - 1, &value);
         if (option == NULL)
             append_word(ret_unknown, unknown_size, variable, strcspn(variable, "="));
         else if (set_option(config, option, value, &cause) != ISCHIA_OK)
@@ -366,8 +372,8 @@ enum ischia_code config_read_environment(struct config *config, char *const *env
 
 enum ischia_code config_check(const struct config *config, struct ischia_error *err)
 {
-    CHECK((config->tls_certificate[0] == '\0') == (config->tls_key[0] == '\0'), err,
-          ISCHIA_E_INPUT, "tls_certificate and tls_key go together: set both or neither");
+    CHECK((config->tls_certificate[0] == '\0') == (config->tls_key[0] == '\0'), err, ISCHIA_E_INPUT,
+          "tls_certificate and tls_key go together: set both or neither");
     CHECK(config->listen[0] != '\0', err, ISCHIA_E_INPUT, "listen is empty");
     CHECK(config->state_dir[0] != '\0', err, ISCHIA_E_INPUT, "state_dir is empty");
     CHECK(config->connections_per_address <= config->connections, err, ISCHIA_E_INPUT,

@@ -84,10 +84,9 @@ ISCHIA_MUST_CHECK enum ischia_code config_read_file(struct config *config, const
 
 /* Applies ISCHIA_* variables. Those that no option owns (other programs may use the prefix too) go
  * to ret_unknown, separated by spaces and cut to fit, for a warning. */
-ISCHIA_MUST_CHECK enum ischia_code config_read_environment(struct config *config,
-                                                           char *const *environment,
-                                                           char *ret_unknown, size_t unknown_size,
-                                                           struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code
+config_read_environment(struct config *config, char *const *environment, char *ret_unknown,
+                        size_t unknown_size, struct ischia_error *err);
 
 /* Rules that join options (certificate with key, ...). */
 ISCHIA_MUST_CHECK enum ischia_code config_check(const struct config *config,

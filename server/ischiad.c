@@ -56,8 +56,8 @@ static const struct {
     const char *flag;
     enum action action;
 } actions[] = {
-    {"check-config", ACT_CHECK}, {"print-config", ACT_PRINT}, {"print-man", ACT_MAN},
-    {"print-routes", ACT_ROUTES}, {"help", ACT_HELP},         {"version", ACT_VERSION},
+    {"check-config", ACT_CHECK},  {"print-config", ACT_PRINT}, {"print-man", ACT_MAN},
+    {"print-routes", ACT_ROUTES}, {"help", ACT_HELP},          {"version", ACT_VERSION},
 };
 
 static bool find_action(const char *flag, struct arguments *ret)
@@ -268,8 +268,8 @@ static void on_note(void *context, const struct pool_note *note)
         [POOL_NOTE_FAILED] = LOG_LEVEL_ERROR,
     };
     static const char *const words[POOL_NOTE_KIND_COUNT] = {
-        [POOL_NOTE_STARTED] = "worker started", [POOL_NOTE_READY] = "worker ready",
-        [POOL_NOTE_ENDED] = "worker ended",     [POOL_NOTE_DIED] = "worker died",
+        [POOL_NOTE_STARTED] = "worker started",       [POOL_NOTE_READY] = "worker ready",
+        [POOL_NOTE_ENDED] = "worker ended",           [POOL_NOTE_DIED] = "worker died",
         [POOL_NOTE_FAILED] = "worker cannot be used",
     };
     struct log_value detail;
@@ -367,8 +367,7 @@ static void reload(struct daemon *d)
     if (load_config(&fresh, d->arguments, &err) != ISCHIA_OK) {
         LOG_ERROR("options not reloaded", "detail=%s", log_quote(&quoted, err.message));
     } else {
-        const size_t others =
-            config_reload(&d->service.config, &fresh, names, sizeof names);
+        const size_t others = config_reload(&d->service.config, &fresh, names, sizeof names);
         service_apply(&d->service);
         LOG_INFO("options reloaded", "need_restart=%s",
                  log_quote(&quoted, others == 0 ? "" : names));
@@ -428,8 +427,7 @@ static void run(struct daemon *d, const sigset_t *signals)
 /* Takes nothing new, and gives running solves their time; a second signal ends that. */
 static void drain(struct daemon *d, const sigset_t *signals)
 {
-    const int64_t until_ms =
-        http_now_ms() + (int64_t)d->service.config.drain_timeout_s * 1000;
+    const int64_t until_ms = http_now_ms() + (int64_t)d->service.config.drain_timeout_s * 1000;
     struct pool_stats stats;
     (void)notify_manager("STOPPING=1");
     atomic_store(&d->service.draining, true);
@@ -566,7 +564,8 @@ static int act(const struct config *config, struct arguments *arguments)
     case ACT_SERVE:
         break;
     }
-    if (arguments->word_count > 0) return admin_run(config, arguments->words, arguments->word_count);
+    if (arguments->word_count > 0)
+        return admin_run(config, arguments->words, arguments->word_count);
     return serve(config, arguments);
 }
 

@@ -118,9 +118,9 @@ static size_t format_time(char *to, size_t size)
 static bool send_to_journal(enum log_level level, const char *message)
 {
     char datagram[LINE_BYTES + 128];
-    const int n = snprintf(datagram, sizeof datagram,
-                           "PRIORITY=%d\nSYSLOG_IDENTIFIER=ischiad\nMESSAGE=%s\n",
-                           journal_priority[level], message);
+    const int n =
+        snprintf(datagram, sizeof datagram, "PRIORITY=%d\nSYSLOG_IDENTIFIER=ischiad\nMESSAGE=%s\n",
+                 journal_priority[level], message);
     if (n <= 0 || (size_t)n >= sizeof datagram) return false;
     return send(journal_socket, datagram, (size_t)n, MSG_NOSIGNAL) == n;
 }

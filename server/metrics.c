@@ -54,8 +54,8 @@ struct histogram {
     atomic_ullong sum_us;
 };
 
-static const int statuses[] = {200, 201, 202, 204, 303, 304, 400, 401, 403, 404, 405, 406, 408,
-                               409, 412, 413, 415, 421, 422, 429, 431, 500, 501, 503};
+static const int statuses[] = {200, 201, 202, 204, 303, 304, 400, 401, 403, 404, 405, 406,
+                               408, 409, 412, 413, 415, 421, 422, 429, 431, 500, 501, 503};
 enum { STATUS_COUNT = COUNT_OF(statuses) };
 
 static const char *const outcome_names[OUTCOME_COUNT] = {
@@ -99,8 +99,7 @@ void metrics_add(enum metric_gauge gauge, int change)
     (void)atomic_fetch_add_explicit(&gauges_milli[gauge], change * 1000LL, memory_order_relaxed);
 }
 
-static void observe(struct histogram *histogram, const double *bounds, size_t count,
-                    double seconds)
+static void observe(struct histogram *histogram, const double *bounds, size_t count, double seconds)
 {
     size_t i = 0;
     while (i < count && seconds > bounds[i]) i++;
@@ -159,8 +158,10 @@ static void print_histogram(FILE *out, const char *name, const char *label, cons
     for (size_t i = 0; i <= count; i++) {
         total += atomic_load_explicit(&histogram->bucket[i], memory_order_relaxed);
         (void)fprintf(out, "%s_bucket{%s=\"%s\",le=\"", name, label, value);
-        if (i < count) (void)fprintf(out, "%g\"} %llu\n", bounds[i], total);
-        else (void)fprintf(out, "+Inf\"} %llu\n", total);
+        if (i < count)
+            (void)fprintf(out, "%g\"} %llu\n", bounds[i], total);
+        else
+            (void)fprintf(out, "+Inf\"} %llu\n", total);
     }
     const double sum = (double)atomic_load_explicit(&histogram->sum_us, memory_order_relaxed) / 1e6;
     (void)fprintf(out, "%s_sum{%s=\"%s\"} %.6f\n%s_count{%s=\"%s\"} %llu\n", name, label, value,
@@ -177,8 +178,10 @@ static void print_routes(FILE *out)
             if (n == 0) continue;
             (void)fprintf(out, "ischia_http_requests_total{route=\"%s\",code=\"",
                           r < route_count ? route_names[r] : "none");
-            if (s < STATUS_COUNT) (void)fprintf(out, "%d\"} %llu\n", statuses[s], n);
-            else (void)fprintf(out, "other\"} %llu\n", n);
+            if (s < STATUS_COUNT)
+                (void)fprintf(out, "%d\"} %llu\n", statuses[s], n);
+            else
+                (void)fprintf(out, "other\"} %llu\n", n);
         }
     }
     print_head(out, "ischia_http_request_seconds", "histogram",
@@ -225,8 +228,8 @@ void metrics_print(FILE *out, const char *model)
     }
     print_head(out, "ischia_solve_seconds", "histogram", "Wall time of solves by outcome.");
     for (int i = 0; i < OUTCOME_COUNT; i++)
-        print_histogram(out, "ischia_solve_seconds", "outcome", outcome_names[i],
-                        &solve_seconds[i], solve_bounds, COUNT_OF(solve_bounds));
+        print_histogram(out, "ischia_solve_seconds", "outcome", outcome_names[i], &solve_seconds[i],
+                        solve_bounds, COUNT_OF(solve_bounds));
     print_head(out, "ischia_store_seconds", "histogram", "Time of calls to the store by kind.");
     for (int i = 0; i < STORE_KIND_COUNT; i++)
         print_histogram(out, "ischia_store_seconds", "kind", store_names[i], &store_seconds[i],

@@ -24,8 +24,8 @@ bool notify_manager(const char *state)
     const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (fd < 0) return false;
     const socklen_t size = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length);
-    const ssize_t sent = sendto(fd, state, strlen(state), MSG_NOSIGNAL,
-                                (const struct sockaddr *)&address, size);
+    const ssize_t sent =
+        sendto(fd, state, strlen(state), MSG_NOSIGNAL, (const struct sockaddr *)&address, size);
     (void)close(fd);
     return sent == (ssize_t)strlen(state);
 }

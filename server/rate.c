@@ -58,8 +58,10 @@ int rate_take(struct rate *rate, const char *client, int per_second, int burst, 
     int wait_s = 0;
     (void)pthread_mutex_lock(lock);
     fill(bucket, per_second, burst, now_ms);
-    if (bucket->level >= 1) bucket->level -= 1;
-    else wait_s = 1 + (int)((1 - bucket->level) / per_second);
+    if (bucket->level >= 1)
+        bucket->level -= 1;
+    else
+        wait_s = 1 + (int)((1 - bucket->level) / per_second);
     (void)pthread_mutex_unlock(lock);
     return wait_s;
 }

@@ -17,8 +17,8 @@ bool gzip_accepted(const char *accept_encoding)
         at += strspn(at, " \t,");
         const size_t length = strcspn(at, ",");
         const size_t name = strcspn(at, " \t;,");
-        const bool matches = (name == 4 && strncasecmp(at, "gzip", 4) == 0) ||
-                             (name == 1 && at[0] == '*');
+        const bool matches =
+            (name == 4 && strncasecmp(at, "gzip", 4) == 0) || (name == 1 && at[0] == '*');
         const char *q = memmem(at, length, "q=", 2);
         if (matches) return q == NULL || strtod(q + 2, NULL) > 0;
         at += length;

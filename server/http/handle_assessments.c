@@ -21,12 +21,14 @@
 enum { WAIT_MAX_S = 60, IDEMPOTENCY_KEY_BYTES = 256, STOP_WAIT_MS = 10000 };
 static const int64_t for_ever_ms = INT64_MAX / 4;
 
-static double seconds_since(int64_t begun_us) { return (double)(metrics_now_us() - begun_us) / 1e6; }
+static double seconds_since(int64_t begun_us)
+{
+    return (double)(metrics_now_us() - begun_us) / 1e6;
+}
 
 static int64_t wait_deadline(const struct call *call)
 {
-    const int seconds =
-        query_prefer_wait(http_request_header(call->request, "Prefer"), WAIT_MAX_S);
+    const int seconds = query_prefer_wait(http_request_header(call->request, "Prefer"), WAIT_MAX_S);
     return seconds < 0 ? 0 : call->request->begun_ms + (int64_t)seconds * 1000;
 }
 
@@ -151,8 +153,10 @@ void handle_get(struct call *call, struct http_response *ret)
         if (call->deadline_ms > 0) (void)call_subscribe(call);
     }
     if (!peek(call, &row, ret)) return;
-    if (still_waiting(call, &row)) call_wait(call, ret);
-    else send_row(call, &row, 200, ret);
+    if (still_waiting(call, &row))
+        call_wait(call, ret);
+    else
+        send_row(call, &row, 200, ret);
 }
 
 /* ---------------------------------------------------------------------------- submit */
@@ -173,19 +177,20 @@ static bool read_request(struct call *call, struct ischia_request *request,
     const struct http_request *http = call->request;
     doc_faults_init(&faults);
     ischia_request_init(request);
-    const enum ischia_code code =
-        is_form(call)
-            ? case_doc_read_form(request, http->body, http->body_size, call->route->body_max,
-                                 &faults, &err)
-            : case_doc_read(request, http->body, http->body_size, &json_limits_request, &faults,
-                            &err);
+    const enum ischia_code code = is_form(call)
+                                      ? case_doc_read_form(request, http->body, http->body_size,
+                                                           call->route->body_max, &faults, &err)
+                                      : case_doc_read(request, http->body, http->body_size,
+                                                      &json_limits_request, &faults, &err);
     if (code == ISCHIA_OK && faults.count == 0) return true;
     if (is_form(call) && call->accepted == 1 && code != ISCHIA_E_MEMORY) {
         page_form(call, http->body, http->body_size, &faults, ret);
         return false;
     }
-    if (code != ISCHIA_OK) problem_from_error(&problem, &err);
-    else problem_from_faults(&problem, &faults);
+    if (code != ISCHIA_OK)
+        problem_from_error(&problem, &err);
+    else
+        problem_from_faults(&problem, &faults);
     reply_problem(http, &problem, ret);
     return false;
 }
@@ -231,8 +236,10 @@ static void on_accepted(void *context, enum ischia_code code, const struct store
 {
     struct deferred *deferred = context;
     deferred->code = code;
-    if (code == ISCHIA_OK) deferred->accepted = *accepted;
-    else deferred->err = *err;
+    if (code == ISCHIA_OK)
+        deferred->accepted = *accepted;
+    else
+        deferred->err = *err;
     deferred_complete(deferred);
 }
 
@@ -352,8 +359,10 @@ static void finish_submit(struct call *call, struct http_response *ret)
         if (call->deadline_ms > 0) (void)call_subscribe(call);
     }
     if (!peek(call, &row, ret)) return;
-    if (still_waiting(call, &row)) call_wait(call, ret);
-    else send_accepted(call, &row, ret);
+    if (still_waiting(call, &row))
+        call_wait(call, ret);
+    else
+        send_accepted(call, &row, ret);
 }
 
 void handle_submit(struct call *call, struct http_response *ret)
@@ -380,14 +389,16 @@ void handle_cancel(struct call *call, struct http_response *ret)
     enum queue_state was = QUEUE_QUEUED;
     if (queue_cancel(call->service->queue, &call->id, &was, &answer, &err) != ISCHIA_OK)
         reply_failure(call->request, ret, &err);
-    else if (answer == STORE_NOT_FOUND) reply_no_assessment(call, ret);
+    else if (answer == STORE_NOT_FOUND)
+        reply_no_assessment(call, ret);
     else if (answer == STORE_CONFLICT && was != QUEUE_CANCELLED)
         reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This assessment has ended: %s.",
                       queue_state_names[was]);
     else if (is_form(call)) { /* the plain report's button */
         ret->status = 303;
         http_header(ret, "Location", "/v1/assessments/%s/report", call->id_text);
-    } else read_and_render(call, 0, ret); /* cancelling twice is no fault */
+    } else
+        read_and_render(call, 0, ret); /* cancelling twice is no fault */
 }
 
 void handle_erase(struct call *call, struct http_response *ret)

@@ -49,10 +49,11 @@ void handle_docs(struct call *call, struct http_response *ret)
                    "<th>does</th></tr></thead>\n<tbody id=\"routes\">\n");
     for (size_t i = 0; i < route_count; i++)
         if (!routes[i].is_page) put_route(&out, &routes[i]);
-    page_put(&out, "</tbody>\n</table>\n<section id=\"try\" hidden>\n<h2>Try it</h2>\n</section>\n"
-                   "<h2>Problems</h2>\n<p>Every error is a problem document (RFC 9457) of one of "
-                   "these types.</p>\n<table>\n<thead><tr><th>status</th><th>title</th><th>type</th>"
-                   "</tr></thead>\n<tbody>\n");
+    page_put(&out,
+             "</tbody>\n</table>\n<section id=\"try\" hidden>\n<h2>Try it</h2>\n</section>\n"
+             "<h2>Problems</h2>\n<p>Every error is a problem document (RFC 9457) of one of "
+             "these types.</p>\n<table>\n<thead><tr><th>status</th><th>title</th><th>type</th>"
+             "</tr></thead>\n<tbody>\n");
     for (int i = 0; i < PROBLEM_KIND_COUNT; i++) put_problem(&out, &problem_kinds[i]);
     page_put(&out, "</tbody>\n</table>\n<script src=\"/assets/docs.js\" defer></script>\n");
     page_end(&out);

@@ -44,8 +44,8 @@ static void close_stream(void *context)
 static void put_frame(struct stream *stream, uint64_t id, const char *name, const char *data)
 {
     const size_t room = sizeof stream->buffer - stream->used;
-    const int n = snprintf(stream->buffer + stream->used, room,
-                           "id: %llu\nevent: %s\ndata: %s\n\n", (unsigned long long)id, name, data);
+    const int n = snprintf(stream->buffer + stream->used, room, "id: %llu\nevent: %s\ndata: %s\n\n",
+                           (unsigned long long)id, name, data);
     if (n > 0 && (size_t)n < room) stream->used += (size_t)n;
 }
 
@@ -94,8 +94,8 @@ static void fill(struct stream *stream)
 {
     struct event events[EVENTS_AT_ONCE];
     stream->used = stream->sent = 0;
-    const size_t count = events_read(stream->service->events, &stream->id, stream->after, events,
-                                     EVENTS_AT_ONCE);
+    const size_t count =
+        events_read(stream->service->events, &stream->id, stream->after, events, EVENTS_AT_ONCE);
     for (size_t i = 0; i < count && !stream->ended; i++) put_event(stream, &events[i]);
     if (count > 0 || http_now_ms() < stream->beat_ms) return;
     if (put_stored_end(stream)) return;
@@ -134,8 +134,7 @@ static bool has_seen_end(struct call *call, const struct store_assessment *row, 
 {
     struct event events[EVENTS_RING];
     if (after == 0 || !queue_is_final(row->state)) return false;
-    const size_t count =
-        events_read(call->service->events, &call->id, 0, events, EVENTS_RING);
+    const size_t count = events_read(call->service->events, &call->id, 0, events, EVENTS_RING);
     for (size_t i = 0; i < count; i++)
         if (events[i].kind == EVENT_DONE) return events[i].id <= after;
     return (uint64_t)row->finished_ms * 1000 <= after;
@@ -176,10 +175,9 @@ void handle_events(struct call *call, struct http_response *ret)
         reply_failure(call->request, ret, &err);
         return;
     }
-    const enum ischia_code code =
-        store_peek(call->service->store, &call->id, &row, &answer, &err);
-    const bool streams = code == ISCHIA_OK && answer == STORE_DONE &&
-                         !has_seen_end(call, &row, after);
+    const enum ischia_code code = store_peek(call->service->store, &call->id, &row, &answer, &err);
+    const bool streams =
+        code == ISCHIA_OK && answer == STORE_DONE && !has_seen_end(call, &row, after);
     if (streams) {
         ret->action = HTTP_STREAM;
         ret->type = "text/event-stream; charset=utf-8";
@@ -191,7 +189,10 @@ void handle_events(struct call *call, struct http_response *ret)
         return;
     }
     close_stream(stream);
-    if (code != ISCHIA_OK) reply_failure(call->request, ret, &err);
-    else if (answer != STORE_DONE) reply_no_assessment(call, ret);
-    else ret->status = 204;
+    if (code != ISCHIA_OK)
+        reply_failure(call->request, ret, &err);
+    else if (answer != STORE_DONE)
+        reply_no_assessment(call, ret);
+    else
+        ret->status = 204;
 }

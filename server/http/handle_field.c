@@ -23,8 +23,10 @@ static void on_drawn(void *context, enum ischia_code code, const unsigned char *
     } else {
         deferred->bytes = malloc(size + 1);
         deferred->size = size;
-        if (deferred->bytes != NULL) memcpy(deferred->bytes, bytes, size);
-        else deferred->code = FAIL(&deferred->err, ISCHIA_E_MEMORY, "no memory for a drawing");
+        if (deferred->bytes != NULL)
+            memcpy(deferred->bytes, bytes, size);
+        else
+            deferred->code = FAIL(&deferred->err, ISCHIA_E_MEMORY, "no memory for a drawing");
     }
     deferred_complete(deferred);
 }

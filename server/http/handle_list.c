@@ -103,8 +103,7 @@ static bool write_row(void *context, const struct store_assessment *row)
 {
     struct json_page *page = context;
     double fraction = 0;
-    if (!queue_is_final(row->state))
-        (void)events_fraction(page->events, &row->id, &fraction);
+    if (!queue_is_final(row->state)) (void)events_fraction(page->events, &row->id, &fraction);
     json_open_object(&page->out, NULL);
     page->code = documents_write(&page->out, row, fraction, &page->err);
     json_close_object(&page->out);
@@ -142,8 +141,10 @@ static void send_json(struct call *call, const struct list_query *q, struct http
     size_t size = 0;
     json_out_init(&page.out, 0);
     enum ischia_code code = write_json(call, q, &page, cursor);
-    if (code == ISCHIA_OK) code = json_out_take(&page.out, &text, &size, &page.err);
-    else json_out_finish(&page.out);
+    if (code == ISCHIA_OK)
+        code = json_out_take(&page.out, &text, &size, &page.err);
+    else
+        json_out_finish(&page.out);
     if (code == ISCHIA_OK) {
         put_next(q, cursor, ret);
         http_body(ret, "application/json", text, size);
@@ -156,8 +157,8 @@ static void send_json(struct call *call, const struct list_query *q, struct http
 
 /* ------------------------------------------------------------------------------- CSV */
 
-static const char *const csv_head[] = {"id",         "created_at", "finished_at", "subject",
-                                       "side",       "label",      "measured_at", "resolution"};
+static const char *const csv_head[] = {"id",   "created_at", "finished_at", "subject",
+                                       "side", "label",      "measured_at", "resolution"};
 enum { CSV_HEAD_COUNT = sizeof csv_head / sizeof csv_head[0] };
 
 struct csv_page {
@@ -206,11 +207,14 @@ static bool write_csv_row(void *context, const struct store_assessment *row)
     uuid_format(&row->id, id);
     documents_time(row->created_ms, created);
     documents_time(row->finished_ms, finished);
-    const char *const head[CSV_HEAD_COUNT] = {
-        id,           created,
-        finished,     request.subject,
-        ischia_side_names[request.side], request.label,
-        request.measured_at, ischia_resolution_names[request.values.resolution]};
+    const char *const head[CSV_HEAD_COUNT] = {id,
+                                              created,
+                                              finished,
+                                              request.subject,
+                                              ischia_side_names[request.side],
+                                              request.label,
+                                              request.measured_at,
+                                              ischia_resolution_names[request.values.resolution]};
     for (int i = 0; i < CSV_HEAD_COUNT; i++) csv_put_text(&page->out, head[i], i == 0);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
         csv_put_number(&page->out, request.values.param[i], false);
@@ -236,7 +240,8 @@ static void send_csv(struct call *call, const struct list_query *q, struct http_
         text_out_finish(&page.out);
         if (code == ISCHIA_E_INPUT && q->filter.cursor != NULL)
             reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, "%s", page.err.message);
-        else reply_failure(call->request, ret, &page.err);
+        else
+            reply_failure(call->request, ret, &page.err);
     }
 }
 
@@ -247,8 +252,10 @@ void handle_list(struct call *call, struct http_response *ret)
     if (!read_list_query(call, &q, ret)) return;
     http_header_static(ret, "Cache-Control", "no-store");
     http_header_static(ret, "Vary", "Accept");
-    if (call->accepted == 1) send_csv(call, &q, ret);
-    else send_json(call, &q, ret);
+    if (call->accepted == 1)
+        send_csv(call, &q, ret);
+    else
+        send_json(call, &q, ret);
     metrics_store(STORE_LISTS, (double)(metrics_now_us() - begun_us) / 1e6);
 }
 
@@ -298,14 +305,18 @@ void handle_changes(struct call *call, struct http_response *ret)
     json_out_init(&out, 0);
     json_open_object(&out, NULL);
     json_open_array(&out, "items");
-    enum ischia_code code = store_changes(call->service->store, since, (int)limit, write_change,
-                                          &out, &last, &err);
+    enum ischia_code code =
+        store_changes(call->service->store, since, (int)limit, write_change, &out, &last, &err);
     json_close_array(&out);
     json_put_integer(&out, "last_seq", last);
     json_close_object(&out);
-    if (code == ISCHIA_OK) code = json_out_take(&out, &text, &size, &err);
-    else json_out_finish(&out);
+    if (code == ISCHIA_OK)
+        code = json_out_take(&out, &text, &size, &err);
+    else
+        json_out_finish(&out);
     http_header_static(ret, "Cache-Control", "no-store");
-    if (code == ISCHIA_OK) http_body(ret, "application/json", text, size);
-    else reply_failure(call->request, ret, &err);
+    if (code == ISCHIA_OK)
+        http_body(ret, "application/json", text, size);
+    else
+        reply_failure(call->request, ret, &err);
 }

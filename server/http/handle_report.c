@@ -29,9 +29,8 @@ static void put_row(struct text_out *out, const char *name, const char *value)
     page_put(out, "</td></tr>\n");
 }
 
-__attribute__((format(printf, 3, 4))) static void put_row_format(struct text_out *out,
-                                                                 const char *name,
-                                                                 const char *format, ...)
+__attribute__((format(printf, 3, 4))) static void
+put_row_format(struct text_out *out, const char *name, const char *format, ...)
 {
     char value[256];
     va_list arguments;
@@ -74,8 +73,10 @@ static void put_inputs(struct text_out *out, const struct ischia_request *reques
 
 static void put_force(struct text_out *out, const char *name, double force_N)
 {
-    if (isnan(force_N)) put_row(out, name, "not reached");
-    else put_row_format(out, name, "%.0f N", force_N);
+    if (isnan(force_N))
+        put_row(out, name, "not reached");
+    else
+        put_row_format(out, name, "%.0f N", force_N);
 }
 
 static void put_strains(struct text_out *out, const struct ischia_result *r)
@@ -85,8 +86,8 @@ static void put_strains(struct text_out *out, const struct ischia_result *r)
                    r->strain.eps_max, r->numerics.eps_max_error);
     put_row_format(out, "its depth below the bone, unloaded", "%.1f mm",
                    r->strain.eps_max_depth_mm);
-    put_row_format(out, "E_shear: largest Green\u2013Lagrange shear strain", "%.3f (threshold %.2f)",
-                   r->strain.E_shear_max, ISCHIA_E_SHEAR_THRESHOLD);
+    put_row_format(out, "E_shear: largest Green\u2013Lagrange shear strain",
+                   "%.3f (threshold %.2f)", r->strain.E_shear_max, ISCHIA_E_SHEAR_THRESHOLD);
     put_row_format(out, "E_comp: largest Green\u2013Lagrange compression", "%.3f (threshold %.2f)",
                    r->strain.E_comp_max, ISCHIA_E_COMP_THRESHOLD);
     page_put(out, "</table>\n");
@@ -102,9 +103,8 @@ static void put_clusters(struct text_out *out, const struct ischia_result *r)
     page_put(out, "<table>\n<caption>Muscle over the thresholds (unloaded volume, whole side)"
                   "</caption>\n");
     for (int k = 0; k < ISCHIA_CRITERION_COUNT; k++) {
-        const double share = r->muscle_volume_mm3 > 0
-                                 ? 100 * r->clusters[k].volume_mm3 / r->muscle_volume_mm3
-                                 : 0;
+        const double share =
+            r->muscle_volume_mm3 > 0 ? 100 * r->clusters[k].volume_mm3 / r->muscle_volume_mm3 : 0;
         put_row_format(out, names[k], "%.0f mm\u00b3 (%.1f %% of the muscle), %d bodies",
                        r->clusters[k].volume_mm3, share, r->clusters[k].count);
     }
@@ -178,11 +178,13 @@ static enum ischia_code put_result(struct text_out *out, const struct store_asse
     page_put(out, "</div>\n<div>\n");
     put_strains(out, &r);
     put_clusters(out, &r);
-    page_put(out, "</div>\n</div>\n<figure><img alt=\"Section through the loaded tissue, coloured by "
-                  "shear strain, with the threshold's contour\" src=\"/v1/assessments/");
+    page_put(out,
+             "</div>\n</div>\n<figure><img alt=\"Section through the loaded tissue, coloured by "
+             "shear strain, with the threshold's contour\" src=\"/v1/assessments/");
     page_put(out, id);
-    page_put(out, "/section.svg\"><figcaption>Symmetry section under load, Green\u2013Lagrange shear "
-                  "strain.</figcaption></figure>\n");
+    page_put(out,
+             "/section.svg\"><figcaption>Symmetry section under load, Green\u2013Lagrange shear "
+             "strain.</figcaption></figure>\n");
     put_notes(out, &request->values);
     return ISCHIA_OK;
 }
@@ -194,7 +196,8 @@ static void put_failure(struct text_out *out, const struct store_assessment *row
     if (row->problem_json != NULL &&
         problem_doc_read(&problem, row->problem_json, strlen(row->problem_json), NULL) == ISCHIA_OK)
         page_escape(out, problem.detail);
-    else page_format(out, "The assessment ended as %s.", queue_state_names[row->state]);
+    else
+        page_format(out, "The assessment ended as %s.", queue_state_names[row->state]);
     page_put(out, "</p>\n");
 }
 
@@ -220,8 +223,10 @@ static enum ischia_code put_report(struct text_out *out, const struct store_asse
     if (row->state == QUEUE_SUCCEEDED) {
         TRY(put_result(out, row, &request, err));
     } else {
-        if (queue_is_final(row->state)) put_failure(out, row);
-        else put_waiting(out, row);
+        if (queue_is_final(row->state))
+            put_failure(out, row);
+        else
+            put_waiting(out, row);
         put_identity(out, row, &request);
         put_inputs(out, &request);
     }

@@ -22,7 +22,8 @@ static void send_json(struct call *call, struct json_out *out, struct http_respo
     size_t size = 0;
     if (json_out_take(out, &text, &size, &err) == ISCHIA_OK)
         http_body(ret, "application/json", text, size);
-    else reply_failure(call->request, ret, &err);
+    else
+        reply_failure(call->request, ret, &err);
 }
 
 void handle_parameters(struct call *call, struct http_response *ret)
@@ -35,7 +36,8 @@ void handle_parameters(struct call *call, struct http_response *ret)
     if (reply_not_modified(call->request, ret)) return;
     if (parameters_doc_text(&text, 2, &err) == ISCHIA_OK)
         http_body(ret, "application/json", text, strlen(text));
-    else reply_failure(call->request, ret, &err);
+    else
+        reply_failure(call->request, ret, &err);
 }
 
 void handle_openapi(struct call *call, struct http_response *ret)
@@ -65,9 +67,9 @@ void handle_ready(struct call *call, struct http_response *ret)
     if (!stored || !solves || draining) {
         http_header_static(ret, "Retry-After", "5");
         reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE, "%s",
-                      draining  ? "The service is shutting down."
+                      draining ? "The service is shutting down."
                       : stored ? "No worker has answered yet."
-                                : "The store cannot be written.");
+                               : "The store cannot be written.");
         return;
     }
     http_header_static(ret, "Cache-Control", "no-store");

@@ -34,7 +34,8 @@
 enum {
     CONNECTION_MEMORY_BYTES = 32 * 1024, /* head of a request, and what the library needs */
     HEAD_BYTES_MAX = 16 * 1024,
-    DISCARD_BYTES_MAX = 1024 * 1024, /* a refused body is read to here, so that the client sees why */
+    DISCARD_BYTES_MAX =
+        1024 * 1024, /* a refused body is read to here, so that the client sees why */
     STREAM_BLOCK_BYTES = 2048,
     TICK_MS = 1000
 };
@@ -89,8 +90,8 @@ struct http_server {
 };
 
 const char *const http_method_names[HTTP_METHOD_COUNT] = {
-    [HTTP_GET] = "GET",       [HTTP_HEAD] = "HEAD",   [HTTP_POST] = "POST",
-    [HTTP_PUT] = "PUT",       [HTTP_PATCH] = "PATCH", [HTTP_DELETE] = "DELETE",
+    [HTTP_GET] = "GET",         [HTTP_HEAD] = "HEAD",   [HTTP_POST] = "POST",
+    [HTTP_PUT] = "PUT",         [HTTP_PATCH] = "PATCH", [HTTP_DELETE] = "DELETE",
     [HTTP_OPTIONS] = "OPTIONS", [HTTP_OTHER] = "",
 };
 
@@ -170,8 +171,10 @@ const char *http_request_header(const struct http_request *request, const char *
 /* With server->lock held. */
 static void unlink_waiting(struct http_exchange *x)
 {
-    if (x->previous != NULL) x->previous->next = x->next;
-    else x->server->waiting = x->next;
+    if (x->previous != NULL)
+        x->previous->next = x->next;
+    else
+        x->server->waiting = x->next;
     if (x->next != NULL) x->next->previous = x->previous;
     x->previous = x->next = NULL;
 }
@@ -188,8 +191,10 @@ void http_wake(struct http_exchange *exchange)
 {
     struct http_server *server = exchange->server;
     (void)pthread_mutex_lock(&server->lock);
-    if (exchange->suspended) resume(exchange);
-    else exchange->wake_pending = true;
+    if (exchange->suspended)
+        resume(exchange);
+    else
+        exchange->wake_pending = true;
     (void)pthread_mutex_unlock(&server->lock);
 }
 
@@ -232,8 +237,10 @@ static int64_t resume_due(struct http_server *server, int64_t now_ms)
     struct http_exchange *x = server->waiting;
     while (x != NULL) {
         struct http_exchange *following = x->next;
-        if (x->wake_at_ms <= now_ms) resume(x);
-        else if (x->wake_at_ms < next_ms) next_ms = x->wake_at_ms;
+        if (x->wake_at_ms <= now_ms)
+            resume(x);
+        else if (x->wake_at_ms < next_ms)
+            next_ms = x->wake_at_ms;
         x = following;
     }
     return next_ms;
@@ -257,9 +264,10 @@ static void refuse_on_socket(struct http_server *server, const struct connection
                                status, MHD_get_reason_phrase_for((unsigned)status), response.type,
                                response.size, (int)response.size, response.bytes);
         http_response_finish(&response);
-        const ssize_t sent = n <= 0 || (size_t)n >= sizeof text
-                                 ? 0
-                                 : send(connection->fd, text, (size_t)n, MSG_NOSIGNAL | MSG_DONTWAIT);
+        const ssize_t sent =
+            n <= 0 || (size_t)n >= sizeof text
+                ? 0
+                : send(connection->fd, text, (size_t)n, MSG_NOSIGNAL | MSG_DONTWAIT);
         (void)sent; /* a client that does not read either gets the closing alone */
     }
     (void)shutdown(connection->fd, SHUT_RDWR);
@@ -278,7 +286,8 @@ static void reap_slow(struct http_server *server, int64_t now_ms)
         /* A connection that never asked for anything is closed without words. */
         if (phase == PHASE_RECEIVING)
             refuse_on_socket(server, c, 408, "The request did not arrive in time.");
-        else (void)shutdown(c->fd, SHUT_RDWR);
+        else
+            (void)shutdown(c->fd, SHUT_RDWR);
     }
     (void)pthread_mutex_unlock(&server->connections_lock);
 }
@@ -335,8 +344,10 @@ static void close_connection(struct http_server *server, struct connection *conn
 {
     if (connection == NULL) return;
     (void)pthread_mutex_lock(&server->connections_lock);
-    if (connection->previous != NULL) connection->previous->next = connection->next;
-    else server->connections = connection->next;
+    if (connection->previous != NULL)
+        connection->previous->next = connection->next;
+    else
+        server->connections = connection->next;
     if (connection->next != NULL) connection->next->previous = connection->previous;
     (void)pthread_mutex_unlock(&server->connections_lock);
     free(connection);
@@ -695,8 +706,10 @@ static enum ischia_code start_daemon(struct http_server *server, struct ischia_e
          (void *)(uintptr_t) "SECURE128:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2"},
         {MHD_OPTION_END, 0, NULL},
     };
-    if (tls) flags |= MHD_USE_TLS;
-    else tls_options[0].option = MHD_OPTION_END;
+    if (tls)
+        flags |= MHD_USE_TLS;
+    else
+        tls_options[0].option = MHD_OPTION_END;
     server->daemon = MHD_start_daemon(
         flags, 0, NULL, NULL, on_access, server, MHD_OPTION_EXTERNAL_LOGGER, on_log, server,
         MHD_OPTION_LISTEN_SOCKET, server->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, server,
@@ -707,8 +720,7 @@ static enum ischia_code start_daemon(struct http_server *server, struct ischia_e
         (unsigned)o->connections_per_address, MHD_OPTION_CONNECTION_TIMEOUT,
         (unsigned)o->idle_timeout_s, MHD_OPTION_THREAD_STACK_SIZE, (size_t)(256 * 1024),
         MHD_OPTION_ARRAY, tls_options, MHD_OPTION_END);
-    CHECK(server->daemon != NULL, err, ISCHIA_E_IO,
-          "the HTTP library did not start%s",
+    CHECK(server->daemon != NULL, err, ISCHIA_E_IO, "the HTTP library did not start%s",
           tls ? "; are tls_certificate and tls_key PEM files that belong together?" : "");
     return ISCHIA_OK;
 }
@@ -740,8 +752,10 @@ enum ischia_code http_start(struct http_server **ret, const struct http_options 
     if (code == ISCHIA_OK)
         code = listen_open(options->listen, &server->listen_fd, server->address, err);
     if (code == ISCHIA_OK) code = start_daemon(server, err);
-    if (code == ISCHIA_OK) *ret = server;
-    else http_destroy(server);
+    if (code == ISCHIA_OK)
+        *ret = server;
+    else
+        http_destroy(server);
     return code;
 }
 

@@ -80,8 +80,8 @@ struct http_response {
     void *owner;
     const char *packed; /* the same body as gzip, in static storage; NULL: none ready       */
     size_t packed_size;
-    bool compressible; /* gzip it for clients that take it                              */
-    bool close;        /* the connection ends with this answer                          */
+    bool compressible;          /* gzip it for clients that take it                              */
+    bool close;                 /* the connection ends with this answer                          */
     char etag[HTTP_ETAG_BYTES]; /* with its quotes; "": none                           */
     int64_t wake_at_ms;         /* HTTP_WAIT: monotonic                               */
     struct http_stream stream;
@@ -143,8 +143,7 @@ struct http_server;
  * usable; ISCHIA_E_IO: it cannot be listened on. *ret is the caller's to stop. */
 ISCHIA_MUST_CHECK enum ischia_code http_start(struct http_server **ret,
                                               const struct http_options *options,
-                                              const struct http_app *app,
-                                              struct ischia_error *err);
+                                              const struct http_app *app, struct ischia_error *err);
 
 /* "127.0.0.1:8080": the address that is really listened on. */
 const char *http_address(const struct http_server *server);
@@ -164,6 +163,6 @@ void http_hold(struct http_exchange *exchange);
 void http_release(struct http_exchange *exchange);
 
 const char *http_library_version(void); /* "0.9.75" */
-int64_t http_now_ms(void); /* the monotonic clock of wake_at_ms */
+int64_t http_now_ms(void);              /* the monotonic clock of wake_at_ms */
 
 #endif

@@ -45,8 +45,7 @@ static enum ischia_code resolve(const char *address, struct addrinfo **ret,
     return ISCHIA_OK;
 }
 
-static void describe(const struct sockaddr *bound, socklen_t size,
-                     char ret[LISTEN_ADDRESS_BYTES])
+static void describe(const struct sockaddr *bound, socklen_t size, char ret[LISTEN_ADDRESS_BYTES])
 {
     char host[INET6_ADDRSTRLEN + 16] = "?", port[8] = "?";
     (void)getnameinfo(bound, size, host, sizeof host, port, sizeof port,
@@ -56,8 +55,7 @@ static void describe(const struct sockaddr *bound, socklen_t size,
 }
 
 static enum ischia_code listen_on(const struct addrinfo *where, int fd,
-                                  char ret_address[LISTEN_ADDRESS_BYTES],
-                                  struct ischia_error *err)
+                                  char ret_address[LISTEN_ADDRESS_BYTES], struct ischia_error *err)
 {
     struct sockaddr_storage bound;
     socklen_t size = sizeof bound;
@@ -79,9 +77,8 @@ enum ischia_code listen_open(const char *address, int *ret_fd,
     struct ischia_error cause;
     TRY(resolve(address, &where, err));
     const int fd = socket(where->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    enum ischia_code code =
-        fd < 0 ? FAIL(&cause, ISCHIA_E_IO, "socket: %s", strerror(errno))
-               : listen_on(where, fd, ret_address, &cause);
+    enum ischia_code code = fd < 0 ? FAIL(&cause, ISCHIA_E_IO, "socket: %s", strerror(errno))
+                                   : listen_on(where, fd, ret_address, &cause);
     freeaddrinfo(where);
     if (code == ISCHIA_OK) {
         *ret_fd = fd;

@@ -23,8 +23,10 @@ void page_escape(struct text_out *out, const char *text)
         const char *entity = NULL;
         for (size_t i = 0; i < sizeof entities / sizeof entities[0]; i++)
             if (*text == entities[i].c) entity = entities[i].entity;
-        if (entity != NULL) page_put(out, entity);
-        else text_put(out, text, 1);
+        if (entity != NULL)
+            page_put(out, entity);
+        else
+            text_put(out, text, 1);
     }
 }
 
@@ -216,8 +218,10 @@ void handle_asset(struct call *call, struct http_response *ret)
 void handle_home(struct call *call, struct http_response *ret)
 {
     const struct asset *page = asset_find("index.html");
-    if (page != NULL) page_asset(call, page, ret);
-    else page_form(call, NULL, 0, NULL, ret);
+    if (page != NULL)
+        page_asset(call, page, ret);
+    else
+        page_form(call, NULL, 0, NULL, ret);
 }
 
 void handle_form(struct call *call, struct http_response *ret)

@@ -15,7 +15,7 @@
 void page_put(struct text_out *out, const char *html);    /* as it is   */
 void page_escape(struct text_out *out, const char *text); /* as text    */
 __attribute__((format(printf, 2, 3))) void page_format(struct text_out *out, const char *format,
-                                                       ...); /* as text */
+                                                       ...);             /* as text */
 void page_begin(struct text_out *out, const char *title, int refresh_s); /* 0: stays as it is */
 void page_end(struct text_out *out);
 

@@ -136,8 +136,10 @@ static int match_entry(const char *entry, size_t length, const char *type, doubl
     const char *slash = strchr(type, '/');
     const char *q = memmem(entry, length, "q=", 2);
     int specific = -1;
-    if (name == strlen(type) && strncasecmp(entry, type, name) == 0) specific = 2;
-    else if (name == 3 && strncmp(entry, "*/*", 3) == 0) specific = 0;
+    if (name == strlen(type) && strncasecmp(entry, type, name) == 0)
+        specific = 2;
+    else if (name == 3 && strncmp(entry, "*/*", 3) == 0)
+        specific = 0;
     else if (slash != NULL && name == (size_t)(slash - type) + 2 && entry[name - 1] == '*' &&
              strncasecmp(entry, type, name - 1) == 0)
         specific = 1;
@@ -213,8 +215,7 @@ bool query_etag_matches(const char *if_none_match, const char *etag)
         const size_t step = length;
         while (length > 0 && (at[length - 1] == ' ' || at[length - 1] == '\t')) length--;
         const size_t tag_length = opaque_tag(at, length, &tag);
-        if (tag_length > 0 && tag_length == wanted_length &&
-            memcmp(tag, wanted, tag_length) == 0)
+        if (tag_length > 0 && tag_length == wanted_length && memcmp(tag, wanted, tag_length) == 0)
             return true;
         at += step;
     }

@@ -13,10 +13,9 @@
 void reply_problem(const struct http_request *request, struct problem *problem,
                    struct http_response *ret);
 /* A problem with nothing but a detail (printf-style). */
-__attribute__((format(printf, 4, 5))) void reply_refusal(const struct http_request *request,
-                                                         struct http_response *ret,
-                                                         enum problem_kind kind,
-                                                         const char *format, ...);
+__attribute__((format(printf, 4, 5))) void
+reply_refusal(const struct http_request *request, struct http_response *ret, enum problem_kind kind,
+              const char *format, ...);
 /* A call that failed for reasons of ours: 500, 503 or 507, logged; the details stay in the log. */
 void reply_failure(const struct http_request *request, struct http_response *ret,
                    const struct ischia_error *err);

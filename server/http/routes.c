@@ -86,7 +86,7 @@ static bool path_matches(const char *template, const char *path, char *ret_id, s
                          char *ret_rest, size_t rest_size)
 {
     while (*template == '/' && *path == '/') {
-        template++;
+        template ++;
         path++;
         const size_t template_length = strcspn(template, "/"), length = strcspn(path, "/");
         if (strcmp(template, "{file}") == 0) {
@@ -122,7 +122,7 @@ void routes_print(FILE *out)
 {
     for (size_t i = 0; i < route_count; i++)
         (void)fprintf(out, "%s %s%s%s%s\n", routes[i].name, routes[i].is_page ? "page " : "",
-                      routes[i].scope == 0          ? "open"
+                      routes[i].scope == 0           ? "open"
                       : routes[i].scope == AUTH_READ ? "read"
                                                      : "",
                       routes[i].scope == AUTH_ASSESS ? "assess" : "",
@@ -196,8 +196,10 @@ static bool refuse_route(struct call *call, struct http_response *ret)
         return false;
     }
     put_allow(ret, call->allowed);
-    if (call->request->method == HTTP_OPTIONS) ret->status = 204;
-    else reply_refusal(call->request, ret, PROBLEM_METHOD, "The Allow header lists what does.");
+    if (call->request->method == HTTP_OPTIONS)
+        ret->status = 204;
+    else
+        reply_refusal(call->request, ret, PROBLEM_METHOD, "The Allow header lists what does.");
     return false;
 }
 
