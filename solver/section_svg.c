@@ -18,7 +18,7 @@
 
 /* The colour scale: bands of equal width, the last open to all higher strains. */
 static const double band_width = 0.125;
-enum { BANDS = 12 };
+enum { BANDS = 16 };
 
 /* What a half is painted with, from the bottom up. */
 enum layer {

@@ -11,7 +11,7 @@
 /*
  * The two symmetry sections of the deformed whole side as one figure: y = 0 (the plane of R2) and
  * x = 0 (the plane of R1), each drawn with its mirror image, at one scale. Muscle is coloured by
- * GREEN-LAGRANGE shear strain, always on the same scale (0 to 1.5) so that figures compare; the
+ * GREEN-LAGRANGE shear strain, always on the same scale (0 to 2) so that figures compare; the
  * contour of the damage threshold 0.75 is a line; tissue without colour is grey. With title and
  * description for screen readers, scale bar and colour bar; readable in grey print. Fixed
  * decimals: the same field gives the same bytes.

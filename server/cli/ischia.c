@@ -19,6 +19,7 @@ static const struct command {
 } commands[] = {
     {"solve", command_solve, "solve one side: JSON in, JSON out"},
     {"cohort", command_cohort, "solve every row of a CSV file"},
+    {"study", command_study, "designs of many solves, emulators, comparisons"},
     {"export", command_export, "write the model for CalculiX, ParaView or as a drawing"},
     {"check-tangent", command_check_tangent, "compare derivatives with finite differences"},
     {"version", command_version, "versions of the program, the model and the libraries"},

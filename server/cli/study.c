@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "server/cli/study.h"
+
+#include <errno.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/cli/files.h"
+
+struct sub_command {
+    const char *name;
+    int (*run)(int argc, char **argv);
+    const char *help;
+};
+
+static const struct sub_command sub_commands[] = {
+    {"factorial", study_factorial, "solve every point of a design file, resumable, on N processes"},
+    {"merge", study_merge, "join the shards of a design into one result file"},
+    {"emulate", study_emulate, "fit polynomials to a result file: coefficients, sensitivities"},
+    {"compare", study_compare, "how two columns or two files agree: correlation, errors, bias"},
+};
+enum { SUB_COMMANDS = sizeof sub_commands / sizeof sub_commands[0] };
+
+static void print_help(FILE *out)
+{
+    (void)fputs("usage: ischia study COMMAND ...\n\n", out);
+    for (int i = 0; i < SUB_COMMANDS; i++)
+        (void)fprintf(out, "  %-10s %s\n", sub_commands[i].name, sub_commands[i].help);
+    (void)fputs("\n`ischia study COMMAND --help` says more.\n", out);
+}
+
+int command_study(int argc, char **argv)
+{
+    const char *name = argc > 1 ? argv[1] : "";
+    if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0) {
+        print_help(stdout);
+        return EXIT_DONE;
+    }
+    for (int i = 0; i < SUB_COMMANDS; i++)
+        if (strcmp(name, sub_commands[i].name) == 0) return sub_commands[i].run(argc - 1, argv + 1);
+    if (argc > 1) (void)fprintf(stderr, "ischia study: there is no command \"%s\"\n", name);
+    print_help(stderr);
+    return EXIT_BAD_INPUT;
+}
+
+int study_failed(const char *what, const struct ischia_error *err)
+{
+    (void)fprintf(stderr, "ischia study %s: %s\n", what, err->message);
+    const bool bad_input =
+        err->code == ISCHIA_E_INPUT || err->code == ISCHIA_E_STATE || err->code == ISCHIA_E_LIMIT;
+    return bad_input ? EXIT_BAD_INPUT : EXIT_SOLVE_FAILED;
+}
+
+int study_usage(const char *what, const char *usage)
+{
+    (void)fprintf(stderr, "%s`ischia study %s --help` says more.\n", usage, what);
+    return EXIT_BAD_INPUT;
+}
+
+enum ischia_code study_write(struct text_out *text, const char *path, struct ischia_error *err)
+{
+    struct file_out out;
+    char *bytes;
+    size_t length;
+    TRY(text_out_take(text, &bytes, &length, err));
+    enum ischia_code code = file_out_open(&out, path != NULL ? path : "-", err);
+    if (code == ISCHIA_OK) {
+        if (fwrite(bytes, 1, length, out.stream) != length)
+            code = FAIL(err, ISCHIA_E_IO, "cannot write %s: %s", out.path, strerror(errno));
+        code = file_out_close(&out, code, err);
+    }
+    free(bytes);
+    return code;
+}

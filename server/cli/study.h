@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SERVER_CLI_STUDY_H
+#define ISCHIA_SERVER_CLI_STUDY_H
+
+#include "api/text.h"
+#include "server/cli/command.h"
+#include "solver/error.h"
+
+/* The sub-commands of `ischia study`, one file each: argv[0] is the sub-command's name. */
+int study_factorial(int argc, char **argv);
+int study_merge(int argc, char **argv);
+int study_emulate(int argc, char **argv);
+int study_compare(int argc, char **argv);
+
+/* Prints "ischia study WHAT: message" on stderr and returns the exit status that fits the code. */
+int study_failed(const char *what, const struct ischia_error *err);
+
+/* Prints a hint at the usage on stderr and returns EXIT_BAD_INPUT. */
+int study_usage(const char *what, const char *usage);
+
+/* Takes the text and writes it to path (NULL or "-": stdout), whole or not at all. */
+ISCHIA_MUST_CHECK enum ischia_code study_write(struct text_out *text, const char *path,
+                                               struct ischia_error *err);
+
+#endif

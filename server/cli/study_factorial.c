@@ -1,0 +1,380 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Rows go to the journal as they finish, in any order; the result file is put together from it at
+ * the end, in the order of the design. Everything in it comes from the design and the solver, so an
+ * interrupted and resumed study ends with the same bytes as one that ran through.
+ */
+#include <getopt.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "server/cli/bar.h"
+#include "server/cli/crew.h"
+#include "server/cli/study.h"
+#include "server/cli/study_journal.h"
+#include "server/cli/study_plan.h"
+
+static const char usage[] =
+    "usage: ischia study factorial DESIGN.json -o OUT.csv [-j N] [--shard I/N] [--quiet]\n"
+    "       ischia study factorial DESIGN.json --points [-o POINTS.csv]\n";
+static const char help[] =
+    "\nSolves every point of a design: one row of OUT.csv for each, with status and reason.\n"
+    "\n  -o, --output FILE  the result file; FILE.journal keeps finished rows while it runs, so "
+    "the\n"
+    "                     same command goes on where it was stopped, even by kill -9\n"
+    "  -j, --jobs N       solve N rows at a time (default: one a processor)\n"
+    "      --shard I/N    solve rows I, I+N, I+2N, ... only; `ischia study merge` joins the "
+    "shards\n"
+    "      --points       write the points and solve nothing\n"
+    "  -q, --quiet        no progress on stderr\n"
+    "\nExit status: 0 every row succeeded, 1 some did not (see their reason), 2 bad input.\n";
+
+struct arguments {
+    const char *design;
+    const char *output;
+    int jobs;
+    size_t shard, shards; /* shard: 0 ... shards - 1 */
+    bool points, quiet;
+};
+
+struct study {
+    const struct arguments *arguments;
+    struct study_plan plan;
+    struct study_journal journal;
+    struct crew crew;
+    bool *died; /* [points.count] the process that solved this row died once */
+    size_t next_row;
+    size_t total, done, failed; /* of this shard                  */
+    size_t before;              /* done by an earlier run         */
+    struct bar bar;
+    double start_s, shown_s;
+};
+
+static int processors(void)
+{
+    const long online = sysconf(_SC_NPROCESSORS_ONLN);
+    if (online < 1) return 1;
+    return online > CREW_MEMBERS_MAX ? CREW_MEMBERS_MAX : (int)online;
+}
+
+static bool parse_whole(const char *text, long min, long max, char stop, const char **ret_end,
+                        long *ret)
+{
+    char *end;
+    const long value = strtol(text, &end, 10);
+    if (end == text || *end != stop || value < min || value > max) return false;
+    *ret = value;
+    *ret_end = end;
+    return true;
+}
+
+static bool parse_shard(const char *text, struct arguments *a)
+{
+    const char *end;
+    long shard, shards;
+    if (!parse_whole(text, 1, INT_MAX, '/', &end, &shard)) return false;
+    if (!parse_whole(end + 1, shard, INT_MAX, '\0', &end, &shards)) return false;
+    a->shard = (size_t)shard - 1;
+    a->shards = (size_t)shards;
+    return true;
+}
+
+static bool parse_jobs(const char *text, struct arguments *a)
+{
+    const char *end;
+    long jobs;
+    if (!parse_whole(text, 1, CREW_MEMBERS_MAX, '\0', &end, &jobs)) return false;
+    a->jobs = (int)jobs;
+    return true;
+}
+
+/* False: the usage is wrong. *ret_help: only help was asked for. */
+static bool parse_arguments(int argc, char **argv, struct arguments *a, bool *ret_help)
+{
+    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
+                                            {"jobs", required_argument, NULL, 'j'},
+                                            {"shard", required_argument, NULL, 's'},
+                                            {"points", no_argument, NULL, 'p'},
+                                            {"quiet", no_argument, NULL, 'q'},
+                                            {"help", no_argument, NULL, 'h'},
+                                            {NULL, 0, NULL, 0}};
+    bool good = true;
+    *a = (struct arguments){.jobs = processors(), .shards = 1};
+    *ret_help = false;
+    optind = 0;
+    for (int c; good && (c = getopt_long(argc, argv, "o:j:qh", options, NULL)) != -1;) {
+        switch (c) {
+        case 'o':
+            a->output = optarg;
+            break;
+        case 'j':
+            good = parse_jobs(optarg, a);
+            break;
+        case 's':
+            good = parse_shard(optarg, a);
+            break;
+        case 'p':
+            a->points = true;
+            break;
+        case 'q':
+            a->quiet = true;
+            break;
+        case 'h':
+            *ret_help = true;
+            return true;
+        default:
+            good = false;
+        }
+    }
+    if (!good || optind + 1 != argc) return false;
+    a->design = argv[optind];
+    return a->points || (a->output != NULL && strcmp(a->output, "-") != 0);
+}
+
+static bool in_shard(const struct study *s, size_t row)
+{
+    return row % s->arguments->shards == s->arguments->shard;
+}
+
+static void count_row(struct study *s, const char *text)
+{
+    s->done++;
+    if (strncmp(text, "succeeded,", strlen("succeeded,")) != 0) s->failed++;
+}
+
+/* ---- progress ---- */
+
+static double now_s(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+/* "1 h 05 min", "3 min 10 s", "8 s". */
+static void duration_words(double seconds, char *ret, size_t size)
+{
+    const long s = lround(seconds);
+    if (s >= 3600) {
+        (void)snprintf(ret, size, "%ld h %02ld min", s / 3600, s / 60 % 60);
+    } else if (s >= 60) {
+        (void)snprintf(ret, size, "%ld min %02ld s", s / 60, s % 60);
+    } else {
+        (void)snprintf(ret, size, "%ld s", s);
+    }
+}
+
+static void state_words(const struct study *s, char *ret, size_t size)
+{
+    char time[32] = "", without[48] = "";
+    const double elapsed = now_s() - s->start_s;
+    const bool finished = s->done == s->total;
+    const double left = elapsed / (double)(s->done - s->before + (s->done == s->before)) *
+                        (double)(s->total - s->done);
+    duration_words(finished ? elapsed : left, time, sizeof time);
+    if (s->failed > 0) (void)snprintf(without, sizeof without, ", %zu without result", s->failed);
+    (void)snprintf(ret, size, "%zu/%zu rows%s, %s%s%s", s->done, s->total, without,
+                   finished ? "took " : "about ", time, finished ? "" : " left");
+}
+
+/* A bar on a terminal; elsewhere a line every ten seconds, so that a log stays readable. */
+static void show_progress(struct study *s)
+{
+    char words[160];
+    const double now = now_s(), pause = s->bar.shown ? 0.2 : 10;
+    if (s->arguments->quiet || s->done == s->total || now - s->shown_s < pause) return;
+    s->shown_s = now;
+    state_words(s, words, sizeof words);
+    if (s->bar.shown) {
+        bar_draw(&s->bar, (double)s->done / (double)s->total, words);
+    } else {
+        (void)fprintf(stderr, "%s\n", words);
+    }
+}
+
+static void start_progress(struct study *s)
+{
+    bar_init(&s->bar);
+    s->before = s->done;
+    s->start_s = s->shown_s = now_s();
+    if (s->done > 0 && !s->arguments->quiet)
+        (void)fprintf(stderr, "%zu of %zu rows are there from an earlier run\n", s->done, s->total);
+}
+
+static void end_progress(struct study *s)
+{
+    char words[160];
+    if (s->arguments->quiet) return;
+    bar_clear(&s->bar);
+    state_words(s, words, sizeof words);
+    (void)fprintf(stderr, "%s\n", words);
+}
+
+/* ---- rows ---- */
+
+static enum ischia_code add_row(struct study *s, size_t row, double wall_s, struct text_out *text,
+                                struct ischia_error *err)
+{
+    char *line;
+    TRY(text_out_take(text, &line, NULL, err));
+    const enum ischia_code code = study_journal_add(&s->journal, row, wall_s, line, err);
+    if (code == ISCHIA_OK) count_row(s, line);
+    free(line);
+    return code;
+}
+
+/* A row whose process died (killed for memory, say) is solved once more before it fails. */
+static enum ischia_code row_answered(struct study *s, const struct crew_answer *answer,
+                                     struct ischia_error *err)
+{
+    const size_t row = (size_t)answer->job;
+    struct text_out text;
+    CHECK(answer->code != ISCHIA_E_MEMORY, err, ISCHIA_E_MEMORY,
+          "row %zu: %.400s; use fewer processes (-j)", row + 1, answer->message);
+    if (answer->code == ISCHIA_E_STATE && !s->died[row]) {
+        const struct ischia_case c = design_case(&s->plan.design, &s->plan.points, row);
+        s->died[row] = true;
+        return crew_give(&s->crew, answer->job, &c, err);
+    }
+    text_out_init(&text);
+    study_response_put(&text, answer, s->plan.response, s->plan.response_count);
+    return add_row(s, row, answer->result.numerics.wall_s, &text, err);
+}
+
+/* A point that is not a valid case is a row too: refused, with the reason. */
+static enum ischia_code refuse(struct study *s, size_t row, const struct ischia_case *c,
+                               struct ischia_error *err)
+{
+    struct text_out text;
+    text_out_init(&text);
+    study_response_put_refused(&text, c, s->plan.response_count);
+    return add_row(s, row, 0, &text, err);
+}
+
+static enum ischia_code give_row(struct study *s, size_t row, struct ischia_error *err)
+{
+    if (!in_shard(s, row) || s->journal.text[row] != NULL) return ISCHIA_OK;
+    const struct ischia_case c = design_case(&s->plan.design, &s->plan.points, row);
+    if (!ischia_case_is_valid(&c)) return refuse(s, row, &c, err);
+    return crew_give(&s->crew, (long)row, &c, err);
+}
+
+static enum ischia_code work_through(struct study *s, struct ischia_error *err)
+{
+    static struct crew_answer answer; /* large, and there is one study in a process */
+    do {
+        while (s->next_row < s->plan.points.count && crew_has_idle(&s->crew))
+            TRY(give_row(s, s->next_row++, err));
+        if (!crew_is_working(&s->crew)) break;
+        TRY(crew_wait(&s->crew, &answer, err));
+        TRY(row_answered(s, &answer, err));
+        show_progress(s);
+    } while (true);
+    return ISCHIA_OK;
+}
+
+static void count_finished(struct study *s)
+{
+    for (size_t row = 0; row < s->plan.points.count; row++) {
+        if (!in_shard(s, row)) continue;
+        s->total++;
+        if (s->journal.text[row] != NULL) count_row(s, s->journal.text[row]);
+    }
+}
+
+static enum ischia_code write_result(struct study *s, struct ischia_error *err)
+{
+    struct text_out out;
+    text_out_init(&out);
+    study_plan_put_header(&out, &s->plan);
+    for (size_t row = 0; row < s->plan.points.count; row++) {
+        if (!in_shard(s, row)) continue;
+        study_plan_put_inputs(&out, &s->plan, row);
+        text_put_string(&out, s->journal.text[row]);
+        text_put_string(&out, "\n");
+    }
+    return study_write(&out, s->arguments->output, err);
+}
+
+static enum ischia_code solve_rows(struct study *s, struct ischia_error *err)
+{
+    count_finished(s);
+    start_progress(s);
+    s->died = calloc(s->plan.points.count + 1, sizeof *s->died);
+    CHECK(s->died != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows",
+          s->plan.points.count);
+    if (s->done < s->total) {
+        TRY(crew_start(&s->crew, s->arguments->jobs, err));
+        const enum ischia_code code = work_through(s, err);
+        crew_stop(&s->crew);
+        TRY(code);
+    }
+    end_progress(s);
+    return write_result(s, err);
+}
+
+static enum ischia_code run_study(struct study *s, struct ischia_error *err)
+{
+    char journal[PATH_MAX];
+    const int needed = snprintf(journal, sizeof journal, "%s.journal", s->arguments->output);
+    CHECK(needed > 0 && (size_t)needed < sizeof journal, err, ISCHIA_E_LIMIT,
+          "the path %s is too long", s->arguments->output);
+    TRY(study_journal_open(&s->journal, journal, study_plan_fingerprint(&s->plan),
+                           s->plan.points.count, err));
+    const enum ischia_code code = solve_rows(s, err);
+    study_journal_close(&s->journal);
+    free(s->died);
+    return code;
+}
+
+/* The same lines as a result file's, cut off after the inputs. */
+static enum ischia_code write_points(struct study *s, struct ischia_error *err)
+{
+    struct text_out out;
+    text_out_init(&out);
+    s->plan.response_count = 0;
+    study_plan_put_header(&out, &s->plan);
+    for (size_t row = 0; row < s->plan.points.count; row++) {
+        if (!in_shard(s, row)) continue;
+        study_plan_put_inputs(&out, &s->plan, row);
+        text_put_string(&out, ",\n");
+    }
+    return study_write(&out, s->arguments->output, err);
+}
+
+static int report(const struct study *s)
+{
+    if (s->failed == 0) return EXIT_DONE;
+    (void)fprintf(stderr, "%zu of %zu rows have no result: their reasons are in %s\n", s->failed,
+                  s->total, s->arguments->output);
+    return EXIT_SOLVE_FAILED;
+}
+
+int study_factorial(int argc, char **argv)
+{
+    struct arguments arguments;
+    struct study study = {.arguments = &arguments};
+    struct ischia_error err;
+    struct text_out faults;
+    bool want_help;
+    if (!parse_arguments(argc, argv, &arguments, &want_help))
+        return study_usage("factorial", usage);
+    if (want_help) {
+        (void)printf("%s%s", usage, help);
+        return EXIT_DONE;
+    }
+    text_out_init(&faults);
+    enum ischia_code code = study_plan_init(&study.plan, arguments.design, &faults, &err);
+    if (faults.length > 0) (void)fputs(faults.text, stderr);
+    text_out_finish(&faults);
+    if (code == ISCHIA_OK) {
+        code = arguments.points ? write_points(&study, &err) : run_study(&study, &err);
+        study_plan_finish(&study.plan);
+    }
+    return code == ISCHIA_OK ? report(&study) : study_failed("factorial", &err);
+}

@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/*
+ * Joins shards. The design is read again, so every row can be checked against the inputs it should
+ * have; the merged file is byte for byte the one that a single run would have written.
+ */
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/cli/files.h"
+#include "server/cli/study.h"
+#include "server/cli/study_plan.h"
+
+enum { SHARD_BYTES_MAX = 1 << 28 };
+
+static const char usage[] = "usage: ischia study merge DESIGN.json SHARD.csv... -o OUT.csv\n";
+
+struct merge {
+    struct study_plan plan;
+    char *header; /* with its line end */
+    char **line;  /* [points.count] whole lines without line end, NULL while missing */
+};
+
+static enum ischia_code take_line(struct merge *m, const char *path, const char *line,
+                                  struct ischia_error *err)
+{
+    struct text_out inputs;
+    char *expected;
+    const unsigned long long number = strtoull(line, NULL, 10);
+    CHECK(number >= 1 && number <= m->plan.points.count, err, ISCHIA_E_INPUT,
+          "%s has a line that is no row of the design: %.60s", path, line);
+    const size_t row = (size_t)number - 1;
+    text_out_init(&inputs);
+    study_plan_put_inputs(&inputs, &m->plan, row);
+    TRY(text_out_take(&inputs, &expected, NULL, err));
+    const bool same = strncmp(line, expected, strlen(expected)) == 0;
+    free(expected);
+    CHECK(same, err, ISCHIA_E_INPUT, "%s: row %llu does not have the inputs of the design", path,
+          number);
+    CHECK(m->line[row] == NULL || strcmp(m->line[row], line) == 0, err, ISCHIA_E_INPUT,
+          "%s: row %llu is in another shard with another result", path, number);
+    if (m->line[row] == NULL) m->line[row] = strdup(line);
+    CHECK(m->line[row] != NULL, err, ISCHIA_E_MEMORY, "out of memory for row %llu", number);
+    return ISCHIA_OK;
+}
+
+static enum ischia_code take_lines(struct merge *m, const char *path, char *text,
+                                   struct ischia_error *err)
+{
+    const size_t header = strlen(m->header);
+    CHECK(strncmp(text, m->header, header) == 0, err, ISCHIA_E_INPUT,
+          "%s does not have the columns of the design", path);
+    char *rest = text + header;
+    for (char *line; (line = strsep(&rest, "\n")) != NULL;)
+        if (line[0] != '\0') TRY(take_line(m, path, line, err));
+    return ISCHIA_OK;
+}
+
+static enum ischia_code take_shard(struct merge *m, const char *path, struct ischia_error *err)
+{
+    char *text;
+    size_t length;
+    TRY(file_read(path, SHARD_BYTES_MAX, &text, &length, err));
+    const enum ischia_code code = take_lines(m, path, text, err);
+    free(text);
+    return code;
+}
+
+static enum ischia_code write_merged(struct merge *m, const char *path, struct ischia_error *err)
+{
+    struct text_out out;
+    size_t missing = 0, first = 0;
+    for (size_t row = m->plan.points.count; row-- > 0;) {
+        if (m->line[row] != NULL) continue;
+        missing++;
+        first = row + 1;
+    }
+    CHECK(missing == 0, err, ISCHIA_E_INPUT,
+          "%zu of %zu rows are in no shard, the first is row %zu", missing, m->plan.points.count,
+          first);
+    text_out_init(&out);
+    text_put_string(&out, m->header);
+    for (size_t row = 0; row < m->plan.points.count; row++) {
+        text_put_string(&out, m->line[row]);
+        text_put_string(&out, "\n");
+    }
+    return study_write(&out, path, err);
+}
+
+static enum ischia_code run_merge(struct merge *m, char **shards, int count, const char *output,
+                                  struct ischia_error *err)
+{
+    struct text_out header;
+    text_out_init(&header);
+    study_plan_put_header(&header, &m->plan);
+    TRY(text_out_take(&header, &m->header, NULL, err));
+    m->line = calloc(m->plan.points.count + 1, sizeof *m->line);
+    CHECK(m->line != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows",
+          m->plan.points.count);
+    for (int i = 0; i < count; i++) TRY(take_shard(m, shards[i], err));
+    return write_merged(m, output, err);
+}
+
+static void merge_finish(struct merge *m)
+{
+    for (size_t row = 0; m->line != NULL && row < m->plan.points.count; row++) free(m->line[row]);
+    free(m->line);
+    free(m->header);
+    study_plan_finish(&m->plan);
+}
+
+int study_merge(int argc, char **argv)
+{
+    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
+                                            {"help", no_argument, NULL, 'h'},
+                                            {NULL, 0, NULL, 0}};
+    struct merge merge = {.header = NULL};
+    struct ischia_error err;
+    struct text_out faults;
+    const char *output = NULL;
+    optind = 0;
+    for (int c; (c = getopt_long(argc, argv, "o:h", options, NULL)) != -1;) {
+        if (c == 'h') return printf("%s", usage) > 0 ? EXIT_DONE : EXIT_SOLVE_FAILED;
+        if (c != 'o') return study_usage("merge", usage);
+        output = optarg;
+    }
+    if (optind + 2 > argc || output == NULL) return study_usage("merge", usage);
+    text_out_init(&faults);
+    enum ischia_code code = study_plan_init(&merge.plan, argv[optind], &faults, &err);
+    if (faults.length > 0) (void)fputs(faults.text, stderr);
+    text_out_finish(&faults);
+    if (code == ISCHIA_OK)
+        code = run_merge(&merge, argv + optind + 1, argc - optind - 1, output, &err);
+    merge_finish(&merge);
+    return code == ISCHIA_OK ? EXIT_DONE : study_failed("merge", &err);
+}
