@@ -6,9 +6,12 @@
  * minimisation, its tangent K is symmetric, and a line search on the potential makes the step safe
  * from anywhere: where K is not positive definite it is made so (element.h, convexity).
  *
- * The exact step, taken once the residual is small, adds the change of N with the displacements,
- * mu t dN: the true derivative of Coulomb's law, not symmetric, of low rank. GMRES solves with it,
- * preconditioned by the factor of K. It is kept when the residual falls, and undone otherwise.
+ * The exact step treats the contact forces as unknowns of their own: like the pressures of the
+ * elements they are carried along by the linear model, for the gradient of a state that is not yet
+ * in equilibrium says nothing about them. They decide which nodes press on the seat (a primal-dual
+ * active set; Hintermueller, Ito and Kunisch 2003) and which slip, and their change enters the
+ * tangent, mu t dN: the derivative of Coulomb's law, not symmetric, of low rank. GMRES solves with
+ * it, preconditioned by the factor of K.
  *
  * d enters as a border: [K b; b' c] [du; dd] = -[g; g_d] by one more solve with K's factor.
  */
@@ -27,15 +30,20 @@ static const double step_min = 1e-6;
 static const double energy_rounding = 1e-12;
 /* The lagged limits are renewed once the rest of the residual is this share of the whole. */
 static const double relag_share = 0.1;
-/* Exact steps start below this residual, and must then reduce it by this factor. */
+/* Exact steps start below this residual; each must reduce the best by this factor, or counts as
+ * idle; after some idle steps they are damped, and after more the run of them is given up. */
 static const double exact_below = 10;
 static const double exact_reduction = 0.7;
+static const int exact_damp_after = 2;
+static const double exact_damping = 0.7;
+static const int exact_idle_max = 6;
+static const int exact_rest = 2;
 static const double gmres_tolerance = 1e-4;
 /* A direction that moves a node further than this, over the tissue's height, comes from a tangent
  * that is nearly singular: descend instead. */
 static const double exact_move_max = 0.1;
-/* How often a direction is found anew because it pushes further nodes through the seat. */
-enum { landing_rounds = 4 };
+/* How often a direction is found anew because it changes which nodes press on the seat. */
+enum { CONTACT_ROUNDS_MAX = 4 };
 
 /* Convexities tried in turn until the tangent is positive definite. */
 static const double convexity_ladder[] = {0, 0.3, 1};
@@ -48,7 +56,8 @@ struct newton {
     double (*force)[3];  /* [node] gradient of the potential                                  */
     double (*trial)[3];  /* [node]                                                            */
     double (*saved)[3];  /* [node] displacements before an exact step                         */
-    double *normal_N;    /* [node] contact forces of the present iterate                      */
+    double *normal_N;    /* [node] scratch: contact forces by the gradient, or by the model */
+    double *saved_N;     /* [node] tracked contact forces before an exact step              */
     double *border;      /* [n] d2E / du dd                                                   */
     double *landing;     /* [n] z step that ends on the seat, of nodes about to touch it      */
     double *from_border; /* [n] K^-1 of the masked border, of the present factor              */
@@ -76,6 +85,7 @@ enum ischia_code newton_create(struct newton **ret, struct body *body, struct as
     w->trial = calloc(nodes, sizeof *w->trial);
     w->saved = calloc(nodes, sizeof *w->saved);
     w->normal_N = calloc(nodes, sizeof *w->normal_N);
+    w->saved_N = calloc(nodes, sizeof *w->saved_N);
     w->border = calloc(n, sizeof *w->border);
     w->landing = calloc(n, sizeof *w->landing);
     w->from_border = calloc(n, sizeof *w->from_border);
@@ -83,7 +93,7 @@ enum ischia_code newton_create(struct newton **ret, struct body *body, struct as
     w->scratch = calloc(n + 1, sizeof *w->scratch);
     w->krylov = malloc(gmres_work_size(assembly->n + 1) * sizeof *w->krylov);
     w->keep = calloc(n, sizeof *w->keep);
-    if (!w->force || !w->trial || !w->saved || !w->normal_N || !w->border || !w->landing ||
+    if (!w->force || !w->trial || !w->saved || !w->normal_N || !w->saved_N || !w->border || !w->landing ||
         !w->from_border || !w->direction || !w->scratch || !w->krylov || !w->keep) {
         newton_destroy(w);
         return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the Newton iteration");
@@ -99,6 +109,7 @@ void newton_destroy(struct newton *w)
     free(w->trial);
     free(w->saved);
     free(w->normal_N);
+    free(w->saved_N);
     free(w->border);
     free(w->landing);
     free(w->from_border);
@@ -119,57 +130,55 @@ static double bone_reaction_N(const struct newton *w)
     return sum;
 }
 
-static double residual_norm(const struct newton *w, const double (*force)[3],
-                            const struct newton_control *control)
+/* Norm of the out-of-balance forces with friction for the tracked contact forces, over the force. A
+ * node that presses on the seat is in balance in z when the tracked force is the gradient. */
+static double residual_norm(const struct newton *w, const struct newton_control *control)
 {
+    const double *tracked_N = w->seat->normal_N;
     double sum = 0;
     for (int n = 0; n < w->body->mesh->node_count; n++)
         for (int c = 0; c < 3; c++) {
-            const int eq = w->assembly->equation[n][c];
-            if (eq >= 0 && w->keep[eq]) sum += force[n][c] * force[n][c];
+            const double resting = c == 2 ? tracked_N[n] : 0;
+            if (w->assembly->equation[n][c] >= 0) sum += pow(w->force[n][c] - resting, 2);
         }
     if (control->force_controlled) sum += pow(w->reaction_N - control->force_N, 2);
     return sqrt(sum) / control->force_N;
 }
 
-/* The residual that friction with the given normal forces leaves; w->trial is the work space. */
-static double residual_with(struct newton *w, const double *normal_N, const double (*u)[3],
-                            const struct newton_control *control)
+static size_t node_bytes(const struct newton *w)
 {
-    memcpy(w->trial, w->force, sizeof *w->force * (size_t)w->body->mesh->node_count);
-    seat_add_force(w->seat, normal_N, u, w->trial);
-    return residual_norm(w, (const double(*)[3])w->trial, control);
+    return sizeof(double) * (size_t)w->body->mesh->node_count;
 }
 
-static void find_contact(struct newton *w, const double (*u)[3])
+/* Contact forces by the gradient: of the nodes on the seat that it presses down. */
+static void find_gradient_normals(struct newton *w, const double (*u)[3])
 {
-    const struct mesh *mesh = w->body->mesh;
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        w->normal_N[n] =
+            seat_binds(w->body->mesh, u, (const double(*)[3])w->force, n) ? w->force[n][2] : 0;
+}
+
+/* Nodes with a contact force leave the system. */
+static void keep_without(struct newton *w, const double *normal_N)
+{
     memset(w->keep, 1, (size_t)w->n);
     memset(w->landing, 0, sizeof *w->landing * (size_t)w->n);
-    for (int n = 0; n < mesh->node_count; n++) {
-        const bool binds = seat_binds(mesh, u, (const double(*)[3])w->force, n);
-        w->normal_N[n] = binds ? w->force[n][2] : 0;
-        if (binds) w->keep[w->assembly->equation[n][2]] = 0;
-    }
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        if (normal_N[n] > 0) w->keep[w->assembly->equation[n][2]] = 0;
 }
 
-/* Everything at u: energy, gradient, tangent, contact, residuals. Renews the lagged contact forces
- * when they are what holds the residual up, and always for an exact step. */
-static void linearise(struct newton *w, const double (*u)[3], double convexity, bool exact,
+/* Energy, elastic gradient and Hessian at u, and friction for the tracked contact forces. */
+static void linearise(struct newton *w, const double (*u)[3], double convexity,
                       const struct newton_control *control)
 {
     struct body_derivatives d = {.force = w->force, .border = w->border};
     w->elastic_Nmm = body_linearise(w->body, w->assembly, u, convexity, &d);
     w->corner = d.corner;
     w->reaction_N = bone_reaction_N(w);
-    find_contact(w, u);
-    w->residual = residual_with(w, w->normal_N, u, control);
-    w->lagged_residual = residual_with(w, w->seat->normal_N, u, control);
-    if (exact || w->lagged_residual < relag_share * w->residual)
-        memcpy(w->seat->normal_N, w->normal_N,
-               sizeof *w->normal_N * (size_t)w->body->mesh->node_count);
+    find_gradient_normals(w, u);
     seat_add_force(w->seat, w->seat->normal_N, u, w->force);
     seat_add_stiffness(w->seat, w->assembly, u);
+    w->residual = residual_norm(w, control);
 }
 
 /* --- the linear system ------------------------------------------------------------------------ */
@@ -206,7 +215,6 @@ static void apply_exact(void *context, const double *x, double *ret_y)
     for (int i = 0; i < w->n; i++)
         if (!w->keep[i]) ret_y[i] = 0;
     ret_y[w->n] = w->force_controlled ? dot(w->n, w->border, x) + w->corner * dd : 0;
-    /* border has no entries outside the mask's columns of x, where x is zero */
 }
 
 /* ret[n + 1] = right-hand side of the step: minus the gradient, less what landing nodes bring. */
@@ -231,24 +239,57 @@ static double largest_move_mm(const struct newton *w)
     return largest;
 }
 
+/* The same for the exact step: slipping nodes feel the gradient's contact force, which the tangent
+ * completes to the model's, instead of the tracked one. */
+static void load_exact_right_hand_side(struct newton *w, const struct newton_control *control,
+                                       double *ret)
+{
+    load_right_hand_side(w, control, ret);
+    for (int n = 0; n < w->body->mesh->node_count; n++) {
+        const int *eq = w->assembly->equation[n];
+        double slip[2];
+        if (eq[2] < 0 || !seat_slip_direction(w->seat, (const double(*)[3])w->trial, n, slip))
+            continue;
+        const double change = w->seat->friction *
+                              (w->force[n][2] + w->scratch[eq[2]] - w->seat->normal_N[n]);
+        for (int c = 0; c < 2; c++)
+            if (eq[c] >= 0) ret[eq[c]] -= change * slip[c];
+    }
+}
+
 static void add_landing(struct newton *w)
 {
     for (int i = 0; i < w->n; i++) w->direction[i] += w->landing[i];
 }
 
-/* Takes the nodes that the direction would push through the seat out of the system, to land on it;
- * returns how many there are. */
-static int find_landing(struct newton *w, const struct equilibrium *state)
+/* Contact forces that the linear model gives after the direction: gradient + K du + border dd. */
+static void find_model_normals(struct newton *w)
+{
+    const double dd = w->force_controlled ? w->direction[w->n] : 0;
+    linear_multiply(w->assembly->linear, w->direction, w->scratch);
+    for (int n = 0; n < w->body->mesh->node_count; n++) {
+        const int eq = w->assembly->equation[n][2];
+        w->normal_N[n] = 0;
+        if (eq >= 0 && !w->keep[eq])
+            w->normal_N[n] = w->force[n][2] + w->scratch[eq] + dd * w->border[eq];
+    }
+}
+
+/* Lets go of nodes that the seat would have to pull, and lands those that the direction would push
+ * through it. Returns how many changed. */
+static int change_contact(struct newton *w, const struct equilibrium *state)
 {
     const struct mesh *mesh = w->body->mesh;
     int count = 0;
     for (int n = 0; n < mesh->node_count; n++) {
         const int eq = w->assembly->equation[n][2];
-        if (!(mesh->node_flags[n] & NODE_ON_SEAT) || eq < 0 || !w->keep[eq]) continue;
+        if (!(mesh->node_flags[n] & NODE_ON_SEAT) || eq < 0) continue;
         const double gap = seat_gap_mm(mesh, (const double(*)[3])state->u_mm, n);
-        if (gap + w->direction[eq] >= 0) continue;
-        w->keep[eq] = 0;
-        w->landing[eq] = -gap;
+        const bool lets_go = !w->keep[eq] && w->normal_N[n] < 0;
+        const bool lands = w->keep[eq] && gap + w->direction[eq] < 0;
+        if (!lets_go && !lands) continue;
+        w->keep[eq] = lets_go;
+        w->landing[eq] = lands ? -gap : 0;
         count++;
     }
     return count;
@@ -280,7 +321,7 @@ static enum ischia_code factor_definite(struct newton *w, const struct equilibri
     *ret_definite = false;
     for (size_t i = 0; i < rungs && !*ret_definite; i++) {
         if (i > 0)
-            linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[i], false, control);
+            linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[i], control);
         TRY(factor(w, report, ret_definite, err));
     }
     return ISCHIA_OK;
@@ -348,12 +389,13 @@ static bool line_search(struct newton *w, struct equilibrium *state,
 }
 
 /* Shortens the step until det F > 0; false when it never is. */
-static bool move_uninverted(struct newton *w, struct equilibrium *state,
-                            const struct newton_control *control)
+static bool move_uninverted(struct newton *w, struct equilibrium *state, double alpha_max,
+                            const struct newton_control *control, double *ret_alpha)
 {
-    for (double alpha = 1; alpha >= step_min; alpha /= 2) {
+    for (double alpha = alpha_max; alpha >= step_min; alpha /= 2) {
         (void)move(w, state, alpha, control);
         if (!(body_det_F_min(w->body, (const double(*)[3])w->trial) > 0)) continue;
+        *ret_alpha = alpha;
         accept(w, state, alpha);
         return true;
     }
@@ -362,11 +404,30 @@ static bool move_uninverted(struct newton *w, struct equilibrium *state,
 
 /* --- the two kinds of step -------------------------------------------------------------------- */
 
+/* Renews the lagged contact forces when they are what holds the residual up. */
+static void relag(struct newton *w, const struct equilibrium *state,
+                  const struct newton_control *control)
+{
+    const double (*u)[3] = (const double(*)[3])state->u_mm;
+    double sum = 0;
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        for (int c = 0; c < 3; c++) {
+            const int eq = w->assembly->equation[n][c];
+            if (eq >= 0 && w->keep[eq]) sum += pow(w->force[n][c], 2);
+        }
+    if (sqrt(sum) / control->force_N >= relag_share * w->residual) return;
+    memcpy(w->seat->normal_N, w->normal_N, node_bytes(w));
+    linearise(w, u, 0, control);
+    keep_without(w, w->normal_N);
+}
+
 static enum ischia_code descent_step(struct newton *w, struct equilibrium *state,
                                      const struct newton_control *control,
                                      struct newton_report *report, struct ischia_error *err)
 {
     bool definite;
+    keep_without(w, w->normal_N);
+    relag(w, state, control);
     TRY(factor_definite(w, state, control, report, &definite, err));
     if (definite) {
         load_right_hand_side(w, control, w->direction);
@@ -379,26 +440,45 @@ static enum ischia_code descent_step(struct newton *w, struct equilibrium *state
     return ISCHIA_OK;
 }
 
-/* *ret_made is false when the tangent is not definite or GMRES gets nowhere; nothing moved then. */
-static enum ischia_code
-exact_step(struct newton *w, struct equilibrium *state, const struct newton_control *control,
-           struct newton_report *report, bool *ret_made, struct ischia_error *err)
+/* *ret_found is false when the tangent is not definite, GMRES gets nowhere, or the direction is
+ * out of bounds. */
+static enum ischia_code exact_direction(struct newton *w, const struct equilibrium *state,
+                                        const struct newton_control *control,
+                                        struct newton_report *report, bool *ret_found,
+                                        struct ischia_error *err)
 {
     const struct gmres_operator op = {apply_exact, bordered_solve, w};
-    double reached = 0;
-    memcpy(w->trial, state->u_mm, sizeof *w->trial * (size_t)w->body->mesh->node_count);
-    for (int round = 0; round < landing_rounds; round++) {
-        TRY(factor(w, report, ret_made, err));
-        if (!*ret_made) return ISCHIA_OK;
-        load_right_hand_side(w, control, w->direction);
+    keep_without(w, w->seat->normal_N);
+    memcpy(w->trial, state->u_mm, 3 * node_bytes(w));
+    for (int round = 0; round < CONTACT_ROUNDS_MAX; round++) {
+        double reached;
+        TRY(factor(w, report, ret_found, err));
+        if (!*ret_found) return ISCHIA_OK;
+        load_exact_right_hand_side(w, control, w->direction);
         TRY(gmres(&op, w->n + 1, gmres_tolerance, w->direction, w->krylov, &reached, err));
         add_landing(w);
-        *ret_made = reached < exact_reduction &&
-                    largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm;
-        if (!*ret_made) return ISCHIA_OK;
-        if (find_landing(w, state) == 0) break;
+        *ret_found = reached < exact_reduction &&
+                     largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm;
+        if (!*ret_found) return ISCHIA_OK;
+        find_model_normals(w);
+        if (change_contact(w, state) == 0) break;
     }
-    *ret_made = move_uninverted(w, state, control);
+    return ISCHIA_OK;
+}
+
+static enum ischia_code exact_step(struct newton *w, struct equilibrium *state, double alpha_max,
+                                   const struct newton_control *control,
+                                   struct newton_report *report, bool *ret_made,
+                                   struct ischia_error *err)
+{
+    double alpha;
+    TRY(exact_direction(w, state, control, report, ret_made, err));
+    if (!*ret_made) return ISCHIA_OK;
+    *ret_made = move_uninverted(w, state, alpha_max, control, &alpha);
+    for (int n = 0; *ret_made && n < w->body->mesh->node_count; n++) {
+        double *tracked = &w->seat->normal_N[n];
+        *tracked = fmax(0, *tracked + alpha * (w->normal_N[n] - *tracked));
+    }
     return ISCHIA_OK;
 }
 
@@ -409,17 +489,16 @@ exact_step(struct newton *w, struct equilibrium *state, const struct newton_cont
  */
 struct exact_run {
     bool active;
-    int idle;        /* steps since the best residual                       */
-    int rest;        /* steps of descent before the next run                */
-    double residual; /* the best                                            */
-    double d_mm;     /* at the best; the displacements are in newton->saved */
+    int idle;        /* steps since the best residual                                          */
+    int rest;        /* steps of descent before the next run                                   */
+    double residual; /* the best                                                               */
+    double d_mm;     /* at the best; displacements and contact forces are in saved and saved_N */
 };
-static const int exact_idle_max = 4;
-static const int exact_rest = 2;
 
 static void run_save(struct newton *w, const struct equilibrium *state, struct exact_run *run)
 {
-    memcpy(w->saved, state->u_mm, sizeof *w->saved * (size_t)w->body->mesh->node_count);
+    memcpy(w->saved, state->u_mm, 3 * node_bytes(w));
+    memcpy(w->saved_N, w->seat->normal_N, node_bytes(w));
     run->residual = w->residual;
     run->d_mm = state->d_mm;
     run->idle = 0;
@@ -428,11 +507,12 @@ static void run_save(struct newton *w, const struct equilibrium *state, struct e
 static void run_undo(struct newton *w, struct equilibrium *state, struct exact_run *run,
                      const struct newton_control *control)
 {
-    memcpy(state->u_mm, w->saved, sizeof *w->saved * (size_t)w->body->mesh->node_count);
+    memcpy(state->u_mm, w->saved, 3 * node_bytes(w));
+    memcpy(w->seat->normal_N, w->saved_N, node_bytes(w));
     state->d_mm = run->d_mm;
     *run = (struct exact_run){.rest = exact_rest};
     body_reset_pressure(w->body, (const double(*)[3])state->u_mm);
-    linearise(w, (const double(*)[3])state->u_mm, 0, true, control);
+    linearise(w, (const double(*)[3])state->u_mm, 0, control);
 }
 
 /* Decides whether the run starts, goes on, or is undone, from the residual just found. */
@@ -447,9 +527,6 @@ static void run_update(struct newton *w, struct equilibrium *state, struct exact
     } else if (++run->idle > exact_idle_max) {
         run_undo(w, state, run, control);
     }
-    if (run->active && memcmp(w->seat->normal_N, w->normal_N,
-                              sizeof *w->normal_N * (size_t)w->body->mesh->node_count) != 0)
-        linearise(w, (const double(*)[3])state->u_mm, 0, true, control);
 }
 
 static enum ischia_code one_step(struct newton *w, struct equilibrium *state,
@@ -457,8 +534,9 @@ static enum ischia_code one_step(struct newton *w, struct equilibrium *state,
                                  struct newton_report *report, struct ischia_error *err)
 {
     if (run->active) {
+        const double alpha_max = run->idle >= exact_damp_after ? exact_damping : 1;
         bool made;
-        TRY(exact_step(w, state, control, report, &made, err));
+        TRY(exact_step(w, state, alpha_max, control, report, &made, err));
         if (made) return ISCHIA_OK;
         run_undo(w, state, run, control);
     }
@@ -474,7 +552,7 @@ enum ischia_code newton_minimise(struct newton *w, struct equilibrium *state,
     struct exact_run run = {0};
     w->force_controlled = control->force_controlled;
     while (report.reason == ISCHIA_NOT_STARTED) {
-        linearise(w, (const double(*)[3])state->u_mm, 0, run.active, control);
+        linearise(w, (const double(*)[3])state->u_mm, 0, control);
         run_update(w, state, &run, control);
         report.residual = w->residual;
         state->force_N = w->reaction_N;
@@ -488,7 +566,7 @@ enum ischia_code newton_minimise(struct newton *w, struct equilibrium *state,
         else
             TRY(one_step(w, state, control, &run, &report, err));
     }
-    memcpy(w->seat->normal_N, w->normal_N, sizeof *w->normal_N * (size_t)w->body->mesh->node_count);
+    keep_without(w, w->seat->normal_N);
     *ret_report = report;
     return ISCHIA_OK;
 }
@@ -499,22 +577,25 @@ void newton_linearise(struct newton *w, const struct equilibrium *state)
     const double(*u)[3] = (const double(*)[3])state->u_mm;
     w->force_controlled = false;
     body_reset_pressure(w->body, u);
-    linearise(w, u, 0, false, &any_scale);
+    linearise(w, u, 0, &any_scale);
+    keep_without(w, w->seat->normal_N);
 }
 
-enum ischia_code newton_tangent(struct newton *w, double *ret_stiffness_N_mm,
-                                double (*ret_direction)[3], struct ischia_error *err)
+enum ischia_code newton_tangent(struct newton *w, struct newton_tangent *ret,
+                                struct ischia_error *err)
 {
     bool definite;
     struct newton_report report = {0};
     TRY(factor(w, &report, &definite, err));
-    *ret_stiffness_N_mm = definite ? w->schur : 0;
-    for (int n = 0; n < w->body->mesh->node_count; n++)
-        for (int c = 0; c < 3; c++) {
-            const int eq = w->assembly->equation[n][c];
-            ret_direction[n][c] = 0;
-            if (eq >= 0 && w->keep[eq]) ret_direction[n][c] = -w->from_border[eq];
-            if (eq == EQUATION_BONE) ret_direction[n][c] = -1;
-        }
+    ret->stiffness_N_mm = definite ? w->schur : 0;
+    for (int i = 0; i < w->n; i++) w->direction[i] = w->keep[i] ? -w->from_border[i] : 0;
+    linear_multiply(w->assembly->linear, w->direction, w->scratch);
+    for (int n = 0; n < w->body->mesh->node_count; n++) {
+        const int *eq = w->assembly->equation[n];
+        for (int c = 0; c < 3; c++)
+            ret->direction[n][c] = eq[c] >= 0 ? w->direction[eq[c]] : eq[c] == EQUATION_BONE ? -1 : 0;
+        ret->normal_rate_N_mm[n] =
+            eq[2] >= 0 && !w->keep[eq[2]] ? w->scratch[eq[2]] + w->border[eq[2]] : 0;
+    }
     return ISCHIA_OK;
 }

@@ -32,7 +32,7 @@ struct path {
     struct path_report *report;
     struct path_point last; /* the last converged step                     */
     double (*u_mm)[3];      /* [node] displacements there                  */
-    double (*direction)[3]; /* [node] du/dd there                          */
+    struct newton_tangent tangent; /* there                                */
     double *normal_N;       /* [node] contact forces there                 */
     double height_mm;
     double target_N;
@@ -45,7 +45,8 @@ static void path_finish(struct path *p)
 {
     newton_destroy(p->newton);
     free(p->u_mm);
-    free(p->direction);
+    free(p->tangent.direction);
+    free(p->tangent.normal_rate_N_mm);
     free(p->normal_N);
 }
 
@@ -53,9 +54,10 @@ static enum ischia_code path_init(struct path *p, struct ischia_error *err)
 {
     const size_t nodes = (size_t)p->nodes;
     p->u_mm = calloc(nodes, sizeof *p->u_mm);
-    p->direction = calloc(nodes, sizeof *p->direction);
+    p->tangent.direction = calloc(nodes, sizeof *p->tangent.direction);
+    p->tangent.normal_rate_N_mm = calloc(nodes, sizeof *p->tangent.normal_rate_N_mm);
     p->normal_N = calloc(nodes, sizeof *p->normal_N);
-    CHECK(p->u_mm && p->direction && p->normal_N, err, ISCHIA_E_MEMORY,
+    CHECK(p->u_mm && p->tangent.direction && p->tangent.normal_rate_N_mm && p->normal_N, err, ISCHIA_E_MEMORY,
           "not enough memory for the load path");
     return newton_create(&p->newton, p->body, p->assembly, p->seat, err);
 }
@@ -75,11 +77,14 @@ static void predict(struct path *p, double dd)
     for (double share = 1; share > 1e-3; share /= 2) {
         for (int n = 0; n < p->nodes; n++) {
             for (int c = 0; c < 3; c++)
-                p->state->u_mm[n][c] = p->u_mm[n][c] + share * dd * p->direction[n][c];
+                p->state->u_mm[n][c] = p->u_mm[n][c] + share * dd * p->tangent.direction[n][c];
             if (mesh->node_flags[n] & NODE_ON_SEAT)
                 p->state->u_mm[n][2] = fmax(p->state->u_mm[n][2], -mesh->X_mm[n][2]);
         }
         p->state->d_mm = p->last.d_mm + share * dd;
+        for (int n = 0; n < p->nodes; n++)
+            p->seat->normal_N[n] =
+                fmax(0, p->normal_N[n] + share * dd * p->tangent.normal_rate_N_mm[n]);
         if (body_det_F_min(p->body, (const double(*)[3])p->state->u_mm) > 0) break;
     }
     body_track_pressure(p->body, 1, (const double(*)[3])p->u_mm,
@@ -102,7 +107,8 @@ static enum ischia_code book(struct path *p, struct ischia_error *err)
 {
     struct path_point now = {p->state->d_mm, p->state->force_N, 0};
     const double step = now.d_mm - p->last.d_mm;
-    TRY(newton_tangent(p->newton, &now.stiffness_N_mm, p->direction, err));
+    TRY(newton_tangent(p->newton, &p->tangent, err));
+    now.stiffness_N_mm = p->tangent.stiffness_N_mm;
     p->work_Nmm += step * (p->last.force_N + now.force_N) / 2 +
                    step * step / 12 * (p->last.stiffness_N_mm - now.stiffness_N_mm);
     p->friction_Nmm += seat_advance(p->seat, (const double(*)[3])p->state->u_mm);
@@ -118,8 +124,11 @@ static enum ischia_code book(struct path *p, struct ischia_error *err)
 /* The state of rest: no force, but a tangent. */
 static enum ischia_code start(struct path *p, struct ischia_error *err)
 {
+    memcpy(p->normal_N, p->seat->normal_N, sizeof *p->normal_N * (size_t)p->nodes);
     newton_linearise(p->newton, p->state);
-    return newton_tangent(p->newton, &p->last.stiffness_N_mm, p->direction, err);
+    TRY(newton_tangent(p->newton, &p->tangent, err));
+    p->last.stiffness_N_mm = p->tangent.stiffness_N_mm;
+    return ISCHIA_OK;
 }
 
 /* One step of at most dd, under force control when that would reach the target. */

@@ -8,6 +8,9 @@
 /* Stiffness of the sticking springs per unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
 static const double stick_stiffness_MPa_mm = 0.25;
 
+/* The outer skin starts resting on the seat: pressed by a force too small to matter, but not zero. */
+static const double resting_N = 1e-12;
+
 static double quad_area_mm2(const struct mesh *mesh, const int quad[4])
 {
     double a[3], b[3];
@@ -42,6 +45,9 @@ enum ischia_code seat_init(struct seat *ret, const struct mesh *mesh, double fri
         return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the seat");
     }
     set_stick_stiffness(&s, mesh);
+    for (int n = 0; n < node_count; n++)
+        if (mesh->node_flags[n] & NODE_ON_SEAT && mesh->X_mm[n][2] <= 0)
+            s.normal_N[n] = resting_N;
     *ret = s;
     return ISCHIA_OK;
 }
@@ -131,17 +137,25 @@ void seat_add_stiffness(const struct seat *seat, const struct assembly *a, const
     }
 }
 
-void seat_add_normal_change(const struct seat *seat, const struct assembly *a, const double (*u)[3],
-                            double *change_N)
+bool seat_slip_direction(const struct seat *seat, const double (*u)[3], int n, double ret_t[2])
+{
+    if (seat->normal_N[n] <= 0) return false;
+    const struct spring s = spring_of(seat, seat->normal_N[n], u, n);
+    if (s.r <= s.slip_r) return false;
+    ret_t[0] = s.dx / s.r;
+    ret_t[1] = s.dy / s.r;
+    return true;
+}
+
+void seat_add_normal_change(const struct seat *seat, const struct assembly *a,
+                            const double (*u)[3], double *change_N)
 {
     for (int n = 0; n < seat->node_count; n++) {
-        if (seat->normal_N[n] <= 0) continue;
-        const struct spring s = spring_of(seat, seat->normal_N[n], u, n);
-        if (s.r <= s.slip_r) continue;
         const int *eq = a->equation[n];
-        const double limit_change = seat->friction * change_N[eq[2]];
-        if (eq[0] >= 0) change_N[eq[0]] += limit_change * s.dx / s.r;
-        if (eq[1] >= 0) change_N[eq[1]] += limit_change * s.dy / s.r;
+        double t[2];
+        if (!seat_slip_direction(seat, u, n, t)) continue;
+        for (int c = 0; c < 2; c++)
+            if (eq[c] >= 0) change_N[eq[c]] += seat->friction * change_N[eq[2]] * t[c];
     }
 }
 

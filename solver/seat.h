@@ -25,7 +25,7 @@ struct seat {
     double friction;              /* Coulomb's coefficient                                       */
     double *stick_stiffness_N_mm; /* [node] k above, by the area that belongs to the node        */
     double (*anchor_mm)[2];       /* [node] where the spring is fixed: displacement, x and y     */
-    double *normal_N;             /* [node] N, lagged; zero where the node does not press        */
+    double *normal_N;             /* [node] N, tracked or lagged; zero where the node is free    */
     int node_count;
 };
 
@@ -63,6 +63,10 @@ void seat_add_stiffness(const struct seat *seat, const struct assembly *assembly
  */
 void seat_add_normal_change(const struct seat *seat, const struct assembly *assembly,
                             const double (*u_mm)[3], double *change_N);
+
+/* True when node n slips; then ret_t is the direction of its friction force on the seat. */
+bool seat_slip_direction(const struct seat *seat, const double (*u_mm)[3], int node,
+                         double ret_t[2]);
 
 /*
  * Ends a load step: anchors of slipping nodes follow, those of nodes off the seat move along.
