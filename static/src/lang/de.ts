@@ -48,6 +48,7 @@ export const de: Strings = {
   'form.resolution': 'Auflösung',
   'form.resolution.standard': 'Standard',
   'form.resolution.fine': 'Fein (langsamer)',
+  'form.resolution.coarse': 'Grob (zum Überblick)',
   'form.sample': 'Beispielperson',
   'form.sample.option': 'Tabelle 2, Person {n}',
   'form.sample.fill': 'Einsetzen',

@@ -46,6 +46,7 @@ export const en = {
   'form.resolution': 'Resolution',
   'form.resolution.standard': 'Standard',
   'form.resolution.fine': 'Fine (slower)',
+  'form.resolution.coarse': 'Coarse (a quick look)',
   'form.sample': 'Sample person',
   'form.sample.option': 'Table 2, subject {n}',
   'form.sample.fill': 'Fill in',

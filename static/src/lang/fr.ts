@@ -49,6 +49,7 @@ export const fr: Strings = {
   'form.resolution': 'Résolution',
   'form.resolution.standard': 'Standard',
   'form.resolution.fine': 'Fine (plus lente)',
+  'form.resolution.coarse': 'Grossière (un aperçu)',
   'form.sample': 'Personne exemple',
   'form.sample.option': 'Tableau 2, sujet {n}',
   'form.sample.fill': 'Remplir',
