@@ -47,9 +47,9 @@ void auth_destroy(struct auth *auth); /* NULL allowed */
 bool auth_has_tokens(struct auth *auth);
 
 /*
- * Judges an Authorization header (NULL: none) at now_ms (Unix time): "Bearer TOKEN", or "Basic" with
- * the token as password, which lets a browser ask for it. Takes the same time whether or not the
- * id exists. With no tokens everything is granted. May be called from any thread.
+ * Judges an Authorization header (NULL: none) at now_ms (Unix time): "Bearer TOKEN", or "Basic"
+ * with the token as password, which lets a browser ask for it. Takes the same time whether or not
+ * the id exists. With no tokens everything is granted. May be called from any thread.
  */
 enum auth_verdict auth_check(struct auth *auth, const char *header, int64_t now_ms,
                              struct auth_identity *ret_identity);

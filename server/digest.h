@@ -16,9 +16,11 @@ struct digest_part {
 /* A part that is a NUL-terminated string; NULL counts as empty. */
 struct digest_part digest_text(const char *text);
 
+/* Digest of the parts in their order. */
 void digest_parts(const struct digest_part *parts, size_t count,
                   unsigned char ret_digest[DIGEST_BYTES]);
 
+/* Lower-case hexadecimal. */
 void digest_hex(const unsigned char digest[DIGEST_BYTES], char ret_hex[DIGEST_HEX_BYTES]);
 
 #endif

@@ -42,6 +42,7 @@ struct event {
 struct events;
 struct events_subscription;
 
+/* *ret_events is the caller's to destroy. */
 ISCHIA_MUST_CHECK enum ischia_code events_create(struct events **ret_events,
                                                  struct ischia_error *err);
 /* Every subscription must be gone. NULL allowed. */
@@ -65,13 +66,14 @@ size_t events_read(struct events *events, const struct uuid *topic, uint64_t aft
 /* The latest progress fraction of a running assessment; false when none is known. */
 bool events_fraction(struct events *events, const struct uuid *topic, double *ret_fraction);
 
-/* Publishes one event (its id and at_ms are filled in here) and wakes who listens. A full ring drops
- * its oldest. Only an event that nobody listens to can be dropped for want of memory. */
+/* Publishes one event (its id and at_ms are filled in here) and wakes who listens. A full ring
+ * drops its oldest. Only an event that nobody listens to can be dropped for want of memory. */
 void events_publish(struct events *events, const struct uuid *topic, const struct event *event);
 
 /* Forgets topics that ended more than `age_ms` ago and have no subscriber. */
 void events_sweep(struct events *events, int64_t age_ms);
 
+/* How many subscriptions there are, over all topics. */
 size_t events_subscriber_count(struct events *events);
 
 #endif

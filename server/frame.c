@@ -78,7 +78,7 @@ static enum ischia_code refuse(struct frame_reader *reader, enum ischia_code cod
     return FAIL(err, code, "the peer broke the protocol: %s", reason);
 }
 
-/* A newline in the unread bytes, at most `most` bytes from their begin; NULL if there is none yet. */
+/* A newline at most `most` bytes into the unread ones; NULL if there is none yet. */
 static char *find_newline(struct frame_reader *reader, size_t most)
 {
     const size_t unread = reader->end - reader->begin;

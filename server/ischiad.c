@@ -22,8 +22,8 @@
 #include "server/sandbox.h"
 
 /*
- * The daemon. main reads the options; serve is a chain of steps, each with its undoing, and the loop
- * between them takes signals, so that no signal handler exists.
+ * The daemon. main reads the options; serve is a chain of steps, each with its undoing, and the
+ * loop between them takes signals, so that no signal handler exists.
  */
 
 enum { EXIT_USAGE = 2, TICK_MS = 1000, RETIRE_EVERY_S = 60, RETIRE_BATCH = 200 };

@@ -47,7 +47,7 @@ struct message {
 ISCHIA_MUST_CHECK enum ischia_code message_write(const struct message *message, char **ret_json,
                                                  size_t *ret_size, struct ischia_error *err);
 
-/* ISCHIA_E_INPUT when it is not one of these messages, whole and in range. *ret is then untouched. */
+/* ISCHIA_E_INPUT when it is not one of these messages, whole and in range; *ret is untouched. */
 ISCHIA_MUST_CHECK enum ischia_code message_read(const char *json, size_t size, struct message *ret,
                                                 struct ischia_error *err);
 

@@ -3,6 +3,7 @@
 
 #include <stdatomic.h>
 #include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -192,19 +193,25 @@ static void print_routes(FILE *out)
                         COUNT_OF(fast_bounds));
 }
 
-/* Resident pages, from /proc; absent elsewhere, and then the line is left out. */
+/* The second number of /proc/self/statm; 0 when it cannot be read. */
+static unsigned long resident_pages(void)
+{
+    char line[128] = "", *end = line;
+    FILE *statm = fopen("/proc/self/statm", "re");
+    if (statm == NULL) return 0;
+    if (fgets(line, sizeof line, statm) != NULL) (void)strtoul(line, &end, 10);
+    (void)fclose(statm);
+    return strtoul(end, NULL, 10);
+}
+
 static void print_process(FILE *out)
 {
     struct timespec cpu;
-    unsigned long size = 0, resident = 0;
-    FILE *statm = fopen("/proc/self/statm", "re");
-    if (statm != NULL) {
-        if (fscanf(statm, "%lu %lu", &size, &resident) == 2) {
-            print_head(out, "process_resident_memory_bytes", "gauge", "Resident memory.");
-            (void)fprintf(out, "process_resident_memory_bytes %lu\n",
-                          resident * (unsigned long)sysconf(_SC_PAGESIZE));
-        }
-        (void)fclose(statm);
+    const unsigned long pages = resident_pages();
+    if (pages > 0) {
+        print_head(out, "process_resident_memory_bytes", "gauge", "Resident memory.");
+        (void)fprintf(out, "process_resident_memory_bytes %lu\n",
+                      pages * (unsigned long)sysconf(_SC_PAGESIZE));
     }
     if (clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &cpu) != 0) return;
     print_head(out, "process_cpu_seconds_total", "counter", "Processor time used by the daemon.");

@@ -125,8 +125,8 @@ extern const char *const pool_render_names[POOL_RENDER_KIND_COUNT]; /* "vtu", "s
 typedef void pool_render_done(void *context, enum ischia_code code, const unsigned char *bytes,
                               size_t size, const struct ischia_error *err);
 
-/* Asks a render worker to draw; copies its inputs; does not wait. done is called exactly once if and
- * only if this returns ISCHIA_OK. ISCHIA_E_LIMIT: too many are waiting. ISCHIA_E_STATE: stopping. */
+/* Asks a render worker to draw; copies its inputs; does not wait. done is called exactly once if
+ * and only if this returns ISCHIA_OK. ISCHIA_E_LIMIT: too many wait. ISCHIA_E_STATE: stopping. */
 ISCHIA_MUST_CHECK enum ischia_code pool_render(struct pool *pool, enum pool_render_kind kind,
                                                const char *case_json, const unsigned char *field,
                                                size_t field_size, pool_render_done *done,
@@ -140,6 +140,7 @@ struct pool_stats {
     uint64_t renders, renders_failed;
     int renders_waiting;
 };
+/* What the pool is doing now and has done since it was created. Any thread. */
 void pool_stats(struct pool *pool, struct pool_stats *ret);
 
 /* Takes no new jobs from now on; running ones may end. Does not wait. */

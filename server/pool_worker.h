@@ -108,6 +108,6 @@ ISCHIA_MUST_CHECK enum ischia_code worker_put_render(struct worker *worker,
 /* Forgets the conversation of a worker that was reaped. */
 void worker_reset(struct worker *worker);
 
-int64_t worker_now_ms(void);
+int64_t worker_now_ms(void); /* CLOCK_MONOTONIC */
 
 #endif

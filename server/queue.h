@@ -65,7 +65,7 @@ struct pool *queue_pool(struct queue *queue); /* for renders and stats */
 /* Accepts and starts nothing more; running solves go on. Does not wait. */
 void queue_drain(struct queue *queue);
 
-/* Drains; running solves have grace_ms to end, then they are put back into the queue. NULL allowed. */
+/* Drains; running solves have grace_ms to end, then they go back into the queue. NULL allowed. */
 void queue_destroy(struct queue *queue, int grace_ms);
 
 #endif

@@ -14,6 +14,7 @@
 
 struct rate;
 
+/* *ret is the caller's to destroy. ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code rate_create(struct rate **ret, struct ischia_error *err);
 void rate_destroy(struct rate *rate); /* NULL allowed */
 

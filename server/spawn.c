@@ -17,9 +17,11 @@
 
 enum { WORKER_FD = 3, EXIT_NOT_EXECUTABLE = 127, EXIT_NOT_SET_UP = 126 };
 
-/* Threads of BLAS would fight over the cores that other workers have. */
+/* Threads of BLAS would fight over the cores that other workers have. CHOLMOD asks OpenMP for four
+ * by number, whatever OMP_NUM_THREADS says: only the limit stops that. */
 static const char *const fixed_environment[] = {"PATH=/usr/bin:/bin", "LANG=C.UTF-8",
-                                                "OPENBLAS_NUM_THREADS=1", "OMP_NUM_THREADS=1"};
+                                                "OPENBLAS_NUM_THREADS=1", "OMP_NUM_THREADS=1",
+                                                "OMP_THREAD_LIMIT=1"};
 /* What sanitizer and coverage builds need to be told. */
 static const char *const passed_environment[] = {"ASAN_OPTIONS", "UBSAN_OPTIONS", "TSAN_OPTIONS",
                                                  "LSAN_OPTIONS", "LLVM_PROFILE_FILE"};

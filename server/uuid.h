@@ -25,6 +25,7 @@ void uuid_format(const struct uuid *id, char ret_text[UUID_TEXT_BYTES]);
 /* Reads exactly that form, either case, any version; false (and *ret untouched) otherwise. */
 bool uuid_parse(const char *text, struct uuid *ret);
 
+/* The same 16 bytes. */
 bool uuid_equal(const struct uuid *a, const struct uuid *b);
 
 #endif

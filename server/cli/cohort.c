@@ -237,7 +237,7 @@ static void say_counts(const struct cohort *k)
                   k->count[ROW_REFUSED]);
 }
 
-static enum exit_status run(struct cohort *k, FILE *in, const char *output, int jobs)
+static int run(struct cohort *k, FILE *in, const char *output, int jobs)
 {
     struct ischia_error err;
     struct stat status;
@@ -275,14 +275,14 @@ static bool defaults_are_known(const struct cohort_defaults *defaults)
     return faults.count == 0;
 }
 
-static enum exit_status run_file(const char *path, const char *output, int jobs,
-                                 const struct cohort_defaults *defaults)
+static int run_file(const char *path, const char *output, int jobs,
+                    const struct cohort_defaults *defaults)
 {
     struct ischia_error err;
     FILE *in;
     if (file_open(path, &in, &err) != ISCHIA_OK) return report_error("cohort", &err);
     struct cohort *k = calloc(1, sizeof *k);
-    enum exit_status status = EXIT_SOLVE_FAILED;
+    int status = EXIT_SOLVE_FAILED;
     if (k != NULL) {
         k->path = strcmp(path, "-") == 0 ? "standard input" : path;
         k->defaults = *defaults;

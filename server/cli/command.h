@@ -8,7 +8,7 @@
  * The commands of `ischia`: one file each, one row each in the table of ischia.c. argv[0] is the
  * command's name. The value is the exit status.
  */
-enum exit_status {
+enum {
     EXIT_DONE = 0,
     EXIT_SOLVE_FAILED = 1, /* also: the machine failed us (memory, disk) */
     EXIT_BAD_INPUT = 2     /* bad input or usage                         */

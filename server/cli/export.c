@@ -20,8 +20,7 @@ static const struct {
     [FORMAT_SVG] = {ischia_write_section_svg, true},
 };
 
-static enum exit_status export_case(enum format format, const char *path,
-                                    const struct ischia_case *c)
+static int export_case(enum format format, const char *path, const struct ischia_case *c)
 {
     struct ischia_result result;
     struct ischia_field field = {0};
@@ -74,6 +73,6 @@ int command_export(int argc, char **argv)
         (void)fprintf(stderr, "ischia export: give one of --inp, --vtu and --svg\n");
         return EXIT_BAD_INPUT;
     }
-    const enum exit_status read = read_request("export", path, resolution, &request);
-    return read == EXIT_DONE ? (int)export_case(format, output, &request.values) : (int)read;
+    const int read = read_request("export", path, resolution, &request);
+    return read == EXIT_DONE ? export_case(format, output, &request.values) : read;
 }

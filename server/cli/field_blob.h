@@ -20,7 +20,8 @@
 enum { FIELD_BLOB_NODES_MAX = 8 * 1000 * 1000 };
 
 /* displacement_mm is [node_count][3]. *ret_bytes is the caller's to free. ISCHIA_E_LIMIT: a
- * component is not finite or is 1000 mm or more, or there are more nodes than FIELD_BLOB_NODES_MAX. */
+ * component is not finite or is 1000 mm or more, or there are more nodes than
+ * FIELD_BLOB_NODES_MAX. */
 ISCHIA_MUST_CHECK enum ischia_code field_blob_encode(const double *displacement_mm,
                                                      size_t node_count, unsigned char **ret_bytes,
                                                      size_t *ret_size, struct ischia_error *err);

@@ -85,10 +85,12 @@ static int command_help(int argc, char **argv)
 /*
  * A BLAS with threads sums in an order that depends on them, and OpenBLAS starts its threads when
  * it is loaded, before main: so the environment is set and the program started once more.
+ * CHOLMOD asks OpenMP for four threads by number; only the limit stops that.
  */
 static void ensure_one_blas_thread(char **argv)
 {
-    static const char *const names[] = {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"};
+    static const char *const names[] = {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS",
+                                        "OMP_THREAD_LIMIT"};
     bool changed = false;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         const char *value = getenv(names[i]);

@@ -9,7 +9,7 @@
 #include "server/cli/bar.h"
 #include "server/cli/files.h"
 
-enum exit_status report_error(const char *command, const struct ischia_error *err)
+int report_error(const char *command, const struct ischia_error *err)
 {
     static const char *const advice[ISCHIA_CODE_COUNT] = {
         [ISCHIA_E_MEMORY] = "; free some memory or use fewer processes",
@@ -48,8 +48,8 @@ static bool set_resolution(struct ischia_request *request, const char *name)
     return false;
 }
 
-enum exit_status read_request(const char *command, const char *path, const char *resolution,
-                              struct ischia_request *ret)
+int read_request(const char *command, const char *path, const char *resolution,
+                 struct ischia_request *ret)
 {
     const char *name = strcmp(path, "-") == 0 ? "standard input" : path;
     struct doc_faults faults;

@@ -9,14 +9,14 @@
 /* What solve and export share: reading the case, solving it with a bar, saying what went wrong. */
 
 /* Prints "ischia COMMAND: message" to stderr. Returns the exit status that fits the code. */
-enum exit_status report_error(const char *command, const struct ischia_error *err);
+int report_error(const char *command, const struct ischia_error *err);
 
 /*
  * Reads a case from a file or "-" and prints each fault on a line of its own, and the warnings.
  * resolution: NULL, or a name that replaces the document's. EXIT_DONE when *ret is good.
  */
-enum exit_status read_request(const char *command, const char *path, const char *resolution,
-                              struct ischia_request *ret);
+int read_request(const char *command, const char *path, const char *resolution,
+                 struct ischia_request *ret);
 
 /* ischia_solve with wall_s and cpu_s (of this thread) filled in: the solver has no clock. */
 ISCHIA_MUST_CHECK enum ischia_code

@@ -47,8 +47,7 @@ static enum ischia_code write_fields(const struct solve_options *options,
     return ISCHIA_OK;
 }
 
-static enum exit_status solve(const struct solve_options *options,
-                              const struct ischia_request *request)
+static int solve(const struct solve_options *options, const struct ischia_request *request)
 {
     struct ischia_result result;
     struct ischia_field field;
@@ -89,6 +88,6 @@ int command_solve(int argc, char **argv)
     struct ischia_request request;
     const enum cli_parse parsed = cli_parse_options(&usage, argc, argv, &path);
     if (parsed != CLI_RUN) return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
-    const enum exit_status read = read_request("solve", path, options.resolution, &request);
-    return read == EXIT_DONE ? (int)solve(&options, &request) : (int)read;
+    const int read = read_request("solve", path, options.resolution, &request);
+    return read == EXIT_DONE ? solve(&options, &request) : read;
 }

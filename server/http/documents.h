@@ -16,6 +16,7 @@
  */
 
 enum { DOCUMENTS_TIME_BYTES = 32 };
+
 /* "2026-03-01T09:30:00.123Z"; "" for 0. */
 void documents_time(int64_t unix_ms, char ret[DOCUMENTS_TIME_BYTES]);
 
@@ -40,6 +41,8 @@ struct document {
 void document_release(void *document); /* also fits http_response.release */
 
 struct documents;
+
+/* *ret is the caller's to destroy. ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code documents_create(struct documents **ret,
                                                     struct ischia_error *err);
 void documents_destroy(struct documents *documents); /* NULL allowed */

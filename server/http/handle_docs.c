@@ -6,7 +6,7 @@
 #include "server/http/reply.h"
 #include "server/http/routes.h"
 
-/* GET /docs: every route and every problem, and a form to try them; it needs nothing from elsewhere.
+/* GET /docs: every route and every problem, and a form to try them; nothing comes from elsewhere.
  * The tables are in the page itself; the script adds what openapi.json says about each route. */
 
 static void put_route(struct text_out *out, const struct route *route)

@@ -11,8 +11,8 @@
 
 /*
  * GET …/events: server-sent events. Each event's id is the daemon's event number, so that a stream
- * that reconnects goes on behind the last one it saw (Last-Event-ID). A client that comes back after
- * `done` is told 204, which ends its reconnecting.
+ * that reconnects goes on behind the last one it saw (Last-Event-ID). A client that comes back
+ * after `done` is told 204, which ends its reconnecting.
  */
 
 enum { HEARTBEAT_MS = 15000, EVENTS_AT_ONCE = 4, LINE_BYTES = 512 };
@@ -128,8 +128,8 @@ static uint64_t last_seen(const struct call *call)
     return (uint64_t)id;
 }
 
-/* True when the client has seen the end: it is in the ring up to `after`, or it is what a stored end
- * would be called. */
+/* True when the client has seen the end: it is in the ring up to `after`, or it is what a stored
+ * end would be called. */
 static bool has_seen_end(struct call *call, const struct store_assessment *row, uint64_t after)
 {
     struct event events[EVENTS_RING];

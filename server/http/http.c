@@ -48,6 +48,7 @@ struct connection {
     bool tls;
     atomic_int phase;
     atomic_llong deadline_ms;
+    int gone_ticks; /* the ticker's own: how often it found the peer gone */
 };
 
 enum step { STEP_HEAD, STEP_BODY, STEP_ANSWER };
@@ -102,63 +103,6 @@ int64_t http_now_ms(void)
     struct timespec now;
     (void)clock_gettime(CLOCK_MONOTONIC, &now);
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
-/* ------------------------------------------------------------------------- responses */
-
-void http_response_init(struct http_response *ret, int status)
-{
-    memset(ret, 0, offsetof(struct http_response, header));
-    ret->action = HTTP_SEND;
-    ret->status = status;
-    ret->bytes = "";
-    ret->header_count = 0;
-    ret->arena_used = 0;
-}
-
-void http_response_finish(struct http_response *response)
-{
-    if (response->release != NULL) response->release(response->owner);
-    response->release = NULL;
-    if (response->action == HTTP_STREAM) response->stream.close(response->stream.state);
-    response->action = HTTP_SEND;
-}
-
-void http_header_static(struct http_response *response, const char *name, const char *value)
-{
-    if (response->header_count == HTTP_HEADERS_MAX) return;
-    response->header[response->header_count].name = name;
-    response->header[response->header_count].value = value;
-    response->header_count++;
-}
-
-void http_header(struct http_response *response, const char *name, const char *format, ...)
-{
-    char *value = response->arena + response->arena_used;
-    const size_t room = sizeof response->arena - response->arena_used;
-    va_list arguments;
-    va_start(arguments, format);
-    const int n = vsnprintf(value, room, format, arguments);
-    va_end(arguments);
-    if (n < 0 || (size_t)n >= room) return;
-    response->arena_used += (size_t)n + 1;
-    http_header_static(response, name, value);
-}
-
-void http_body(struct http_response *response, const char *type, char *bytes, size_t size)
-{
-    http_body_static(response, type, bytes, size);
-    response->release = free;
-    response->owner = bytes;
-    response->compressible = true;
-}
-
-void http_body_static(struct http_response *response, const char *type, const char *bytes,
-                      size_t size)
-{
-    response->type = type;
-    response->bytes = bytes;
-    response->size = size;
 }
 
 const char *http_request_header(const struct http_request *request, const char *name)
@@ -249,7 +193,7 @@ static int64_t resume_due(struct http_server *server, int64_t now_ms)
 /* ---------------------------------------------------------------------- slow clients */
 
 /* Answers past the library, which cannot answer in the middle of a request. It has sent nothing for
- * this request, so the bytes are the first. Over TLS the library alone can write: no words there. */
+ * this request, so the bytes are the first. Over TLS only the library can write: no words there. */
 static void refuse_on_socket(struct http_server *server, const struct connection *connection,
                              int status, const char *detail)
 {
@@ -273,22 +217,39 @@ static void refuse_on_socket(struct http_server *server, const struct connection
     (void)shutdown(connection->fd, SHUT_RDWR);
 }
 
+/*
+ * True when the peer has sent its last byte, all of it was read, and no request came of it. The
+ * library takes a short read for the end of what is there and so misses a closing that came along
+ * with it, until its timeout. Seen twice, so that a request just being read is not cut off.
+ */
+static bool is_gone(struct connection *connection)
+{
+    char byte = 0;
+    const bool ended = recv(connection->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+    connection->gone_ticks = ended ? connection->gone_ticks + 1 : 0;
+    return connection->gone_ticks > 1;
+}
+
+static void reap_one(struct http_server *server, struct connection *connection, int64_t now_ms)
+{
+    int phase = atomic_load(&connection->phase);
+    if (phase != PHASE_IDLE && phase != PHASE_RECEIVING) return;
+    const bool gone = is_gone(connection);
+    if (!gone && now_ms < atomic_load(&connection->deadline_ms)) return;
+    if (!atomic_compare_exchange_strong(&connection->phase, &phase, PHASE_REAPED)) return;
+    if (!gone) server->app.on_slow_client(server->app.context);
+    /* A connection that never asked for anything is closed without words. */
+    if (phase == PHASE_RECEIVING && !gone)
+        refuse_on_socket(server, connection, 408, "The request did not arrive in time.");
+    else
+        (void)shutdown(connection->fd, SHUT_RDWR);
+}
+
 static void reap_slow(struct http_server *server, int64_t now_ms)
 {
     (void)pthread_mutex_lock(&server->connections_lock);
-    for (struct connection *c = server->connections; c != NULL; c = c->next) {
-        int phase = atomic_load(&c->phase);
-        if ((phase != PHASE_IDLE && phase != PHASE_RECEIVING) ||
-            now_ms < atomic_load(&c->deadline_ms))
-            continue;
-        if (!atomic_compare_exchange_strong(&c->phase, &phase, PHASE_REAPED)) continue;
-        server->app.on_slow_client(server->app.context);
-        /* A connection that never asked for anything is closed without words. */
-        if (phase == PHASE_RECEIVING)
-            refuse_on_socket(server, c, 408, "The request did not arrive in time.");
-        else
-            (void)shutdown(c->fd, SHUT_RDWR);
-    }
+    for (struct connection *c = server->connections; c != NULL; c = c->next)
+        reap_one(server, c, now_ms);
     (void)pthread_mutex_unlock(&server->connections_lock);
 }
 

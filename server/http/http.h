@@ -117,8 +117,8 @@ struct http_app {
                     struct http_response *ret_refusal);
     /* All is read, or a wait ended. ret is initialised with status 200. */
     void (*on_request)(void *context, struct http_request *request, struct http_response *ret);
-    /* The transport refuses (408, 413, 431): the application words it. request is NULL when there is
-     * none to speak of; the answer may then have no headers of its own. */
+    /* The transport refuses (408, 413, 431): the application words it. request is NULL when there
+     * is none to speak of; the answer may then have no headers of its own. */
     void (*on_refuse)(void *context, struct http_request *request, int status, const char *detail,
                       struct http_response *ret);
     /* The last call for a request; status 0 when no answer was sent. */

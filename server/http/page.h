@@ -12,11 +12,16 @@
 
 /* HTML that needs no JavaScript. Everything that did not come from our own tables is escaped. */
 
-void page_put(struct text_out *out, const char *html);    /* as it is   */
-void page_escape(struct text_out *out, const char *text); /* as text    */
+/* Adds markup of ours as it is. */
+void page_put(struct text_out *out, const char *html);
+/* Adds text with the characters that mean something in HTML escaped. */
+void page_escape(struct text_out *out, const char *text);
+/* The same, printf-style; cut after 1 KiB. */
 __attribute__((format(printf, 2, 3))) void page_format(struct text_out *out, const char *format,
-                                                       ...);             /* as text */
-void page_begin(struct text_out *out, const char *title, int refresh_s); /* 0: stays as it is */
+                                                       ...);
+/* Starts a document in an empty out. It loads itself again after refresh_s seconds; 0: never. */
+void page_begin(struct text_out *out, const char *title, int refresh_s);
+/* Closes what page_begin opened. */
 void page_end(struct text_out *out);
 
 /* The plain form, made from the parameter table. body: what was sent (NULL: nothing) to fill it

@@ -113,18 +113,12 @@ int query_prefer_wait(const char *prefer, int max)
     const char *at = prefer;
     while (at != NULL && *at != '\0') {
         at += strspn(at, " \t,;");
-        const size_t length = strcspn(at, ",;");
-        char number[16];
-        long long seconds = 0;
-        if (length > 5 && length < 5 + sizeof number && strncasecmp(at, "wait=", 5) == 0) {
-            size_t digits = strspn(at + 5, "0123456789");
-            if (digits > 9) digits = 9;
-            memcpy(number, at + 5, digits);
-            number[digits] = '\0';
-            if (query_whole_number(number, 0, 999999999, &seconds))
-                return seconds > max ? max : (int)seconds;
+        if (strncasecmp(at, "wait=", 5) == 0 && isdigit((unsigned char)at[5])) {
+            errno = 0;
+            const long seconds = strtol(at + 5, NULL, 10);
+            return errno != 0 || seconds > max ? max : (int)seconds;
         }
-        at += length;
+        at += strcspn(at, ",;");
     }
     return -1;
 }
@@ -138,7 +132,10 @@ static int match_entry(const char *entry, size_t length, const char *type, doubl
     int specific = -1;
     if (name == strlen(type) && strncasecmp(entry, type, name) == 0)
         specific = 2;
-    else if (name == 3 && strncmp(entry, "*/*", 3) == 0)
+    else if (name == 3 && strncmp(entry,
+                                  "*"
+                                  "/*",
+                                  3) == 0)
         specific = 0;
     else if (slash != NULL && name == (size_t)(slash - type) + 2 && entry[name - 1] == '*' &&
              strncasecmp(entry, type, name - 1) == 0)

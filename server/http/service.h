@@ -76,7 +76,7 @@ struct deferred *deferred_create(struct call *call);
 void deferred_complete(struct deferred *deferred);
 void deferred_drop(struct deferred *deferred);
 
-/* Asks to be called again when something happens to the assessment, at the latest at deadline_ms. */
+/* Asks to be called again when something happens to the assessment, or at deadline_ms. */
 void call_wait(struct call *call, struct http_response *response);
 /* Subscribes the call to its assessment's events, once. */
 bool call_subscribe(struct call *call);

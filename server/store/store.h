@@ -59,8 +59,9 @@ struct store_options {
 /*
  * Opens the store and, when `mode` allows, creates it (directory 0700, files 0600) or brings it to
  * this program's schema version.
- * ISCHIA_E_STATE: another daemon has it; or it was written by a newer program. ISCHIA_E_INPUT: it is
- * damaged, or not a store of ours: the message says what to do; no byte of it was changed.
+ * ISCHIA_E_STATE: another daemon has it; or it was written by a newer program.
+ * ISCHIA_E_INPUT: it is damaged, or not a store of ours: the message says what to do;
+ * no byte of it was changed.
  * *ret_store is the caller's to close.
  */
 ISCHIA_MUST_CHECK enum ischia_code store_open(const struct store_options *options,
@@ -301,7 +302,7 @@ ISCHIA_MUST_CHECK enum ischia_code store_token_epoch(struct store *store, int64_
 /* -------------------------------------------------------------------------------- audit
  * Rows are chained: each carries SHA-256 over its own fields and the hash before it, so that a row
  * changed, removed or put in later breaks the chain from there on. What a chain cannot show is that
- * its newest rows were cut off; whoever must prove that notes seq and hash of the head elsewhere. */
+ * its newest rows were cut off; whoever must show that notes seq and hash of the head elsewhere. */
 
 struct store_audit {
     int64_t seq;         /* filled in by the store                                            */
@@ -353,6 +354,7 @@ struct store_stats {
     uint64_t latency_count[STORE_LATENCY_BUCKETS]; /* write calls by time from call to commit */
     double latency_sum_ms;
 };
+/* Numbers for metrics; cheap however many assessments there are. */
 ISCHIA_MUST_CHECK enum ischia_code store_stats(struct store *store, struct store_stats *ret,
                                                struct ischia_error *err);
 

@@ -87,7 +87,7 @@ ISCHIA_MUST_CHECK enum ischia_code db_open(const char *path, enum db_access acce
                                            struct ischia_error *err);
 void db_close(struct db *db); /* NULL allowed */
 
-/* Fills *err from the connection's last error, in words for an operator. `doing` completes "cannot". */
+/* Fills *err from the connection's last error, in words for an operator: it cannot `doing`. */
 enum ischia_code db_fail(struct db *db, const char *doing, struct ischia_error *err);
 
 /* Runs SQL text that returns nothing. */
@@ -126,6 +126,7 @@ ISCHIA_MUST_CHECK enum ischia_code query_run(struct query *query, struct ischia_
 /* Runs a kept statement without parameters. */
 ISCHIA_MUST_CHECK enum ischia_code db_run(struct db *db, enum sql sql, struct ischia_error *err);
 
+/* A column of the present row; 0 for NULL. */
 int64_t query_integer(struct query *query, int column);
 /* NULL stays NULL; malloc'ed, the caller's. */
 ISCHIA_MUST_CHECK enum ischia_code query_text(struct query *query, int column, char **ret,
@@ -152,6 +153,7 @@ struct sqlite_paths {
     char database[SQLITE_PATH_BYTES];
     char lock[SQLITE_PATH_BYTES];
 };
+/* ISCHIA_E_INPUT: no name, or one that is too long. */
 ISCHIA_MUST_CHECK enum ischia_code sqlite_paths_of(const char *location, struct sqlite_paths *ret,
                                                    struct ischia_error *err);
 
@@ -203,7 +205,7 @@ struct store {
 };
 
 int64_t sqlite_now_ms(const struct store *store); /* by the clock it was opened with */
-int64_t sqlite_system_now_ms(void);
+int64_t sqlite_system_now_ms(void);               /* by CLOCK_REALTIME */
 
 /* Borrows a reader connection; waits when all are lent and no more can be opened. */
 ISCHIA_MUST_CHECK enum ischia_code reader_take(struct store *store, struct db **ret_db,
@@ -238,7 +240,9 @@ ISCHIA_MUST_CHECK enum ischia_code write_run(struct store *store, struct write *
 ISCHIA_MUST_CHECK enum ischia_code write_later(struct store *store, struct write *write,
                                                struct ischia_error *err);
 
+/* The writer thread; it uses store->writer from now on. */
 ISCHIA_MUST_CHECK enum ischia_code writer_start(struct store *store, struct ischia_error *err);
+/* Commits what waits, ends the thread. */
 void writer_stop(struct store *store);
 
 /* Adds to the change log; *ret_seq is its number. */

@@ -230,10 +230,7 @@ enum ischia_code query_step(struct query *query, bool *ret_row, struct ischia_er
 {
     if (query->failed != SQLITE_OK) return db_fail(query->db, "take a value", err);
     const int code = sqlite3_step(query->statement);
-    if (code != SQLITE_ROW && code != SQLITE_DONE) {
-        const bool reads = sqlite3_stmt_readonly(query->statement) != 0;
-        return db_fail(query->db, reads ? "be read" : "be written", err);
-    }
+    if (code != SQLITE_ROW && code != SQLITE_DONE) return db_fail(query->db, "be used", err);
     *ret_row = code == SQLITE_ROW;
     return ISCHIA_OK;
 }

@@ -122,23 +122,44 @@ static enum ischia_code damaged(const char *path, int sqlite_code, struct ischia
     return err == NULL ? ISCHIA_E_IO : err->code;
 }
 
-enum ischia_code sqlite_look(const char *path, bool whole, int *ret_version,
-                             struct ischia_error *err)
+/* *ret_unfinished: a write that was cut off must be taken back before the file can be read. */
+static enum ischia_code look_once(const char *path, bool whole, int *ret_version,
+                                  bool *ret_unfinished, struct ischia_error *err)
 {
-    struct ischia_error own;
-    if (err == NULL) err = &own;
     struct db *db = NULL;
     const enum ischia_code opened = db_open(path, DB_LOOK, 5000, &db, err);
-    if (opened != ISCHIA_OK) {
-        const bool bad = opened == ISCHIA_E_INPUT;
-        return bad ? damaged(path, SQLITE_NOTADB, err) : opened;
-    }
+    if (opened != ISCHIA_OK)
+        return opened == ISCHIA_E_INPUT ? damaged(path, SQLITE_NOTADB, err) : opened;
     enum ischia_code code = judge_version(db, path, ret_version, err);
     if (code == ISCHIA_OK && whole) code = judge_pages(db, path, err);
     const int sqlite_code = sqlite3_extended_errcode(db->handle);
     db_close(db);
-    if (code != ISCHIA_OK) code = damaged(path, sqlite_code, err);
+    *ret_unfinished = code != ISCHIA_OK && sqlite_code == SQLITE_READONLY_ROLLBACK;
+    return code == ISCHIA_OK ? ISCHIA_OK : damaged(path, sqlite_code, err);
+}
+
+/* Cut off while the file was made or its journal mode set: SQLite left the means to take it back,
+ * and does so when the file is first read by someone who may write. */
+static enum ischia_code take_back_unfinished(const char *path, struct ischia_error *err)
+{
+    struct db *db = NULL;
+    int64_t tables;
+    TRY(db_open(path, DB_READ, 5000, &db, err));
+    const enum ischia_code code = db_number(db, "SELECT count(*) FROM sqlite_schema", &tables, err);
+    db_close(db);
     return code;
+}
+
+enum ischia_code sqlite_look(const char *path, bool whole, int *ret_version,
+                             struct ischia_error *err)
+{
+    struct ischia_error own;
+    bool unfinished = false;
+    if (err == NULL) err = &own;
+    const enum ischia_code code = look_once(path, whole, ret_version, &unfinished, err);
+    if (!unfinished) return code;
+    TRY(take_back_unfinished(path, err));
+    return look_once(path, whole, ret_version, &unfinished, err);
 }
 
 /* --------------------------------------------------------------------------- migrations */

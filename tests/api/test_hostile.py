@@ -4,6 +4,7 @@
 import json
 import os
 import random
+import re
 import signal
 import socket
 import threading
@@ -28,8 +29,33 @@ class Hostile(unittest.TestCase):
     def tearDownClass(cls):
         cls.service.stop()
 
+    def setUp(self):
+        """What the test before left behind is gone soon: well before any timeout but the quick ones."""
+        end = time.monotonic() + 8
+        while self.connections() > 3:
+            self.assertLess(time.monotonic(), end, 'connections that were left are kept')
+            time.sleep(0.1)
+
     def tearDown(self):
         self.assertIsNone(self.service.process.poll(), self.service.errors()[-2000:])
+
+    def connections(self):
+        text = self.service.get('/metrics').body.decode()
+        return int(re.search(r'^ischia_http_connections (\d+)', text, re.M).group(1))
+
+    def test_those_who_leave_in_the_middle_are_forgotten(self):
+        with Service('--request-timeout', '3000', '--idle-timeout', '3000') as service:
+            host, port = service.address.split(':')
+            for text in (b'', b'GET /hea', b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+                         b'Content-Type: application/json\r\nContent-Length: 99\r\n\r\n{'):
+                for _ in range(20):
+                    connection = socket.create_connection((host, int(port)), timeout=10)
+                    connection.sendall(text)
+                    connection.close()
+            end = time.monotonic() + 8
+            while 'ischia_http_connections 1\n' not in service.get('/metrics').body.decode():
+                self.assertLess(time.monotonic(), end)
+                time.sleep(0.2)
 
     def open(self):
         return socket.create_connection(self.where, timeout=10)

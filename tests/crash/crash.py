@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the crash tests share: the harness as a process, its promises, and the judge of its store."""
+"""What the crash tests share: the harness as a process, its promises, and a judge of its store."""
 import json
 import os
 import random

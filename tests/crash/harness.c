@@ -6,7 +6,7 @@
  *                                   a promise: "accepted ID N DEED", "cancelled ID"
  *   harness finish DIR FAKE_WORKER  works until nothing is queued or running, says "finished"
  *
- * Refusals by the store go to stdout as well: "refused CODE MESSAGE", at most ten a second a thread.
+ * Refusals by the store go to stdout as well: "refused CODE MESSAGE", ten a second a thread.
  */
 #include <pthread.h>
 #include <stdio.h>

@@ -18,7 +18,7 @@ def one_life(program, directory, worker, promises):
     harness = Harness("serve", program, directory, worker)
     if random.random() < 0.9:
         harness.ready.wait(30)
-        time.sleep(random.uniform(0, 0.12))
+        time.sleep(random.uniform(0, 0.2))
         if random.random() < 0.5:
             kill_one_worker(harness)
             time.sleep(random.uniform(0, 0.03))

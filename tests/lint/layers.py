@@ -34,17 +34,16 @@ FOREIGN = {
     "lapacke.h": "solver/study/least_squares.c",
     "cjson/cJSON.h": "api/json.c",
     "microhttpd.h": "server/http/http.c",
-    "zlib.h": "server/http/",
+    "zlib.h": "server/",  # packs replies, and the fields that are kept (cli/field_blob.c)
     "sqlite3.h": "server/store/store_sqlite",
     "libpq-fe.h": "server/store/store_postgresql",
     "sodium": "server/",  # hashing, tokens, random numbers and constant-time comparison
     "systemd/sd-daemon.h": "server/notify.c",
     "systemd/sd-journal.h": "server/log.c",
-    "seccomp.h": "server/sandbox.c",
+    "seccomp.h": "server/cli/worker_sandbox.c",
     "linux/audit.h": "server/sandbox.c",
     "linux/filter.h": "server/sandbox.c",
     "linux/landlock.h": "server/sandbox.c",
-    "linux/seccomp.h": "server/sandbox.c",
 }
 
 # What a program must never load, directly or through a library of ours.
