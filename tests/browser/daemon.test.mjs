@@ -38,10 +38,12 @@ afterEach(async () => {
 const document_of = (id) =>
   page.evaluate(async (path) => (await fetch(path)).json(), `/v1/assessments/${id}`);
 
-/* Sends a person of Table 2 and resolves to the ids of the two sides. */
-async function submit_sample() {
+/* Sends a person of Table 2 and resolves to the ids of the two sides. The daemon answers at once
+ * what it has solved before: `force` makes the numbers new. */
+async function submit_sample(force) {
   await open_form(page, origin);
   await page.getByRole('button', { name: 'Fill in' }).click();
+  if (force) for (const side of ['left', 'right']) await page.fill(`#${side}-F`, force);
   await page.selectOption('.submit select', 'coarse');
   await page.click('button[type=submit]');
   await page.waitForURL('**/assessments/**');
@@ -96,7 +98,7 @@ test('the 3-D view and the section draw the field of the daemon', async () => {
 });
 
 test('cancel stops a solve', async () => {
-  const ids = await submit_sample();
+  const ids = await submit_sample('201,5');
   for (const button of await page.getByRole('button', { name: 'Cancel' }).all())
     await button.click();
   await all_ended(2);
@@ -105,7 +107,7 @@ test('cancel stops a solve', async () => {
 });
 
 test('the daemon is killed in the middle of a solve, comes back, and the page recovers', async () => {
-  const ids = await submit_sample();
+  const ids = await submit_sample('202,5');
   await page.locator('.running').first().waitFor();
   await daemon.end('SIGKILL');
   await page.locator('.lost').first().waitFor();

@@ -229,7 +229,7 @@ export const en = {
   'strip.all': 'The reference sides in numbers',
   'strip.side': 'Subject and side',
 
-  'history.title': 'Earlier assessments of {subject}',
+  'history.title': 'Assessments of {subject} over time',
   'history.none': 'No other assessment of this subject.',
   'history.alt': 'ε max of this subject over time. The table has the numbers.',
   'history.when': 'Measured',

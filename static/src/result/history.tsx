@@ -12,6 +12,7 @@ import { ticks } from './axis.js';
 import { finished, type Finished } from './quantities.js';
 
 const size = { width: 460, height: 120, left: 36, right: 20, top: 12, foot: 22 };
+const day_ms = 24 * 3600 * 1000; /* two sides of one visit make no history */
 const time_of = (d: Assessment): string => d.measured_at ?? d.created_at;
 
 /* Read again whenever one more of the assessments shown has ended. */
@@ -51,7 +52,7 @@ function Chart(props: { items: Finished[]; current: string[] }) {
   const { items, current } = props;
   const times = items.map((d) => Date.parse(time_of(d)));
   const [first, last] = [Math.min(...times), Math.max(...times)];
-  if (items.length < 2 || first === last) return null;
+  if (items.length < 2 || last - first < day_ms) return null;
   const max = Math.max(...items.map((d) => d.result.strain.eps_max)) * 1.15;
   const bottom = size.height - size.foot;
   const x = (time: number): number =>

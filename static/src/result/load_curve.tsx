@@ -53,6 +53,8 @@ function PanelPlot(props: {
   const y = (v: number): number => bottom - (v / max) * plot.height;
   const line = points.map((p, i) => `${i ? 'L' : 'M'}${x(p.F_N)} ${y(panel.of(p))}`).join('');
   const y_threshold = y(panel.threshold);
+  const ends_above = panel.of(points[points.length - 1] as LoadPoint) > panel.threshold;
+  const y_label = y_threshold + (ends_above ? 12 : -5); /* the side that the line leaves free */
   const latest = 0.8 * (points[points.length - 1]?.F_N ?? 0); /* a label after it would not fit */
   return (
     <g class={`panel ${panel.class}`}>
@@ -68,7 +70,7 @@ function PanelPlot(props: {
         </g>
       ))}
       <path class="threshold" d={`M${plot.left} ${y_threshold}H${width - plot.right}`} />
-      <text class="threshold" x={plot.left + 4} y={y_threshold - 4}>
+      <text class="threshold" x={width - plot.right} y={y_label} text-anchor="end">
         {t('curve.threshold', { value: panel.threshold })}
       </text>
       <path class="line" d={line} />
@@ -91,7 +93,7 @@ function PanelPlot(props: {
 
 function Table(props: { points: LoadPoint[] }) {
   return (
-    <details>
+    <details open>
       <summary>{t('curve.table')}</summary>
       <div class="scroll" tabIndex={0} role="group" aria-label={t('curve.table')}>
         <table class="numbers small">

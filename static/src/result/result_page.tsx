@@ -11,7 +11,7 @@ import {
   type Parameters,
 } from '../api.js';
 import { Follower, has_ended, type Followed } from '../follow.js';
-import { format_time, t } from '../i18n.js';
+import { format_time, t, t_or } from '../i18n.js';
 import { form_address } from '../router.js';
 import { Reports } from '../report/report.js';
 import type { Assessment } from '../types.js';
@@ -112,6 +112,9 @@ function Meta(props: { of: Assessment }) {
     of.subject ? t('result.subject', { subject: of.subject }) : '',
     of.label ?? '',
     of.measured_at ? t('result.measured', { time: format_time(of.measured_at) }) : '',
+    of.resolution && of.resolution !== 'standard'
+      ? `${t('form.resolution')}: ${t_or(`form.resolution.${of.resolution}`, of.resolution)}`
+      : '',
     of.finished_at ? t('result.computed', { time: format_time(of.finished_at) }) : '',
   ];
   return <p class="hint">{parts.filter(Boolean).join(' · ')}</p>;
