@@ -220,7 +220,7 @@ export const de: Strings = {
   'numbers.energy_residual': 'Energieresiduum, relativ',
   'numbers.wall': 'Zeit',
 
-  'strip.title': 'Unter den 26 Seiten der Tabelle 2',
+  'strip.title': 'Unter {n} Seiten der Tabelle 2',
   'strip.note': 'Die 13 Personen aus Macron et al. (2020), mit demselben Modell berechnet.',
   'strip.alt':
     '{metric} der {n} Vergleichsseiten und dieser Auswertung. Die Tabelle hat die Zahlen.',

@@ -214,7 +214,7 @@ export const en = {
   'numbers.energy_residual': 'energy residual, relative',
   'numbers.wall': 'time',
 
-  'strip.title': 'Against the 26 sides of Table 2',
+  'strip.title': 'Against {n} sides of Table 2',
   'strip.note': 'The 13 persons of Macron et al. (2020), computed with this same model.',
   'strip.alt':
     '{metric} of the {n} reference sides and of this assessment. The table has the numbers.',

@@ -218,7 +218,7 @@ export const fr: Strings = {
   'numbers.energy_residual': 'résidu d’énergie, relatif',
   'numbers.wall': 'durée',
 
-  'strip.title': 'Parmi les 26 côtés du tableau 2',
+  'strip.title': 'Parmi {n} côtés du tableau 2',
   'strip.note': 'Les 13 personnes de Macron et al. (2020), calculées avec ce même modèle.',
   'strip.alt':
     '{metric} des {n} côtés de référence et de cette évaluation. Le tableau donne les nombres.',

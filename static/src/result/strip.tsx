@@ -63,7 +63,7 @@ function Strip(props: { metric: Metric; reference: number[]; ours: number[]; let
       {ours.map((v, i) => (
         <g key={i} class={`ours n${i}`}>
           <path d={`M${x(v)} ${line_y - 6}l-6 -10h12z`} />
-          <text x={x(v)} y={line_y - 20} text-anchor={i ? 'start' : 'end'} dx={i ? -3 : 3}>
+          <text x={x(v)} y={line_y - 20} text-anchor={i ? 'start' : 'end'} dx={i ? 1 : -1}>
             {letters[i]}
           </text>
         </g>
@@ -164,7 +164,7 @@ export function Strips(props: { documents: Finished[] }) {
   if (sides.length === 0 || props.documents.length === 0) return null;
   return (
     <section class="panel-box strips" aria-labelledby="strips">
-      <h2 id="strips">{t('strip.title')}</h2>
+      <h2 id="strips">{t('strip.title', { n: sides.length })}</h2>
       <p class="hint">{t('strip.note')}</p>
       {metrics.map((metric) => (
         <Row key={metric.key} metric={metric} sides={sides} documents={props.documents} />
