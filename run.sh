@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Builds a release, starts the service on this machine with its data in ./data, has it solve one side
-# of Table 2 of Macron et al. (2020), and stays until Ctrl-C. Usage: ./run.sh [ADDRESS:PORT]
+# Builds a release, starts the service on this machine with its data in ./data, has it solve one
+# side of Table 2 of Macron et al. (2020), and stays until Ctrl-C. Usage: ./run.sh [ADDRESS:PORT]
 # On Debian 12, as root or with sudo, it first installs what is missing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
@@ -15,6 +15,7 @@ ninja -C build/release server/ischiad server/cli/ischia
 build/release/server/ischiad --listen "$listen" --state-dir data &
 service=$!
 trap 'kill -TERM "$service" 2>/dev/null; wait "$service"' EXIT
-python3 deploy/first_side.py "http://$listen" examples/table2_1R.json || echo "The service stays; its log is above." >&2
+python3 deploy/first_side.py "http://$listen" examples/table2_1R.json ||
+  echo "There was no result; the service stays, its log is above." >&2
 trap 'kill -TERM "$service" 2>/dev/null' INT TERM
 wait "$service"

@@ -86,7 +86,7 @@ const char *case_doc_column_key(const char *column);
 /* The known key that a mistyped one probably means, static; NULL when none is near. */
 const char *case_doc_nearest_key(const char *key);
 
-/* Writers, into the object that is open in out; reading back gives the same request, bit for bit. */
+/* Writers, into the object that is open in out; reading back gives the same request bit by bit. */
 void case_doc_write(struct json_out *out, const struct ischia_request *request); /* all keys      */
 void case_doc_write_parameters(struct json_out *out, const struct ischia_case *c); /* the seven   */
 void case_doc_write_options(struct json_out *out,

@@ -4,7 +4,7 @@
 
 #include "api/case_doc.h"
 
-/* What the readers of a case share: the keys and what is done with each. Only api/case_*.c use it. */
+/* What the readers of a case share: the keys and what is done with each. For api/case_*.c only. */
 
 /* Keys 0 ... ISCHIA_PARAM_COUNT - 1 are the seven inputs, then these, then one for each option. */
 enum case_key {

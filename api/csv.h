@@ -31,14 +31,15 @@ struct csv_reader {
     char buffer[CSV_ROW_BYTES_MAX + 1];
 };
 
+/* The stream stays the caller's; nothing is read yet. */
 void csv_reader_init(struct csv_reader *ret, FILE *in);
 
 /*
  * Reads the next row; blank lines are skipped. *ret_end is true, and the row has no fields, when
  * there is none left. ISCHIA_E_INPUT: a quote out of place or not closed, invalid UTF-8, a NUL;
- * ISCHIA_E_LIMIT: too long or too many columns. For both row->line says where, and the reader stands
- * at the next line, so that reading may go on: a stray quote costs one line, not the rest of the
- * file. ISCHIA_E_IO ends it.
+ * ISCHIA_E_LIMIT: too long or too many columns. For both row->line says where, and the reader
+ * stands at the next line, so that reading may go on: a stray quote costs one line, not the rest of
+ * the file. ISCHIA_E_IO ends it.
  */
 ISCHIA_MUST_CHECK enum ischia_code csv_read(struct csv_reader *reader, struct csv_row *row,
                                             bool *ret_end, struct ischia_error *err);

@@ -11,8 +11,9 @@
  * All the bad fields of a document at once: what readers of documents report, what problem
  * documents show as "errors", and what the command line prints one to a line.
  *
- * Codes: missing, unknown, duplicate, wrong_type, not_finite, too_many, out_of_range, inconsistent, not_allowed
- * (a word that is not one of those accepted), malformed (text of the wrong form), unsupported.
+ * Codes: missing, unknown, duplicate, wrong_type, not_finite, too_many, out_of_range, inconsistent,
+ * not_allowed (a word that is not one of those accepted), malformed (text of the wrong form),
+ * unsupported.
  */
 enum { DOC_FAULTS_MAX = 32, DOC_POINTER_BYTES = sizeof((struct ischia_fault *)0)->pointer };
 
@@ -22,6 +23,7 @@ struct doc_faults {
     size_t dropped; /* how many more there were than item has room for  */
 };
 
+/* An empty list. */
 void doc_faults_init(struct doc_faults *ret);
 
 /* Adds one fault. pointer is cut to its room between characters; the detail is printf-style and is

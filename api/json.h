@@ -53,6 +53,7 @@ ISCHIA_MUST_CHECK enum ischia_code json_parse(struct json **ret, const char *tex
                                               struct doc_faults *faults, struct ischia_error *err);
 void json_destroy(struct json *root); /* NULL allowed */
 
+/* Looking at a value; strings live as long as the document. */
 enum json_type json_type_of(const struct json *value);
 bool json_bool(const struct json *value);     /* JSON_BOOL (asserted)                 */
 double json_number(const struct json *value); /* JSON_NUMBER (asserted); finite unless reported */

@@ -22,7 +22,7 @@ static void put_line_break(struct json_out *out)
 {
     static const char spaces[] = "                                                                ";
     if (out->indent == 0) return;
-    const size_t wanted = (size_t)(out->indent * out->depth), most = sizeof spaces - 1;
+    const size_t wanted = (size_t)out->indent * (size_t)out->depth, most = sizeof spaces - 1;
     text_put(&out->text, "\n", 1);
     text_put(&out->text, spaces, wanted < most ? wanted : most);
 }

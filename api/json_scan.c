@@ -42,7 +42,7 @@ static bool take(struct scan *s, char c)
 
 static void skip_space(struct scan *s)
 {
-    while (s->at < s->length && memchr(" \t\r\n", s->text[s->at], 4) != NULL) s->at++;
+    for (int c = peek(s); c == ' ' || c == '\t' || c == '\r' || c == '\n'; c = peek(s)) s->at++;
 }
 
 static bool hex_digit(int c, unsigned *value)

@@ -31,7 +31,7 @@ void text_put_string(struct text_out *out, const char *string);
 void text_put_number(struct text_out *out, double value); /* as text_from_number */
 
 /* Hands the text over: *ret_text is the caller's to free and out is empty again. ISCHIA_E_MEMORY
- * when any write failed; then the outputs are untouched and out is freed. ret_length: NULL allowed. */
+ * when any write failed; then outputs are untouched and out is freed. ret_length may be NULL. */
 ISCHIA_MUST_CHECK enum ischia_code text_out_take(struct text_out *out, char **ret_text,
                                                  size_t *ret_length, struct ischia_error *err);
 

@@ -39,13 +39,21 @@ def show(document):
         return 1
     strain, numerics = result['strain'], result['numerics']
     print(f'  {result["risk"]["headline"]}')
-    print(f'  eps_max (engineering shear on the axis)   {strain["eps_max"]:.3f}'
-          f' +- {numerics["eps_max_error"]:.3f}')
-    print(f'  E_shear, E_comp (Green-Lagrange, largest) {strain["E_shear_max"]:.3f},'
-          f' {strain["E_comp_max"]:.3f}')
-    print(f'  muscle over both thresholds               '
-          f'{result["clusters"]["both"]["volume_mm3"]:.0f} mm3')
-    print(f'  solved in {numerics["wall_s"]:.1f} s, {numerics["newton_iterations"]} Newton iterations')
+    print(
+        f'  eps_max (engineering shear on the axis)   {strain["eps_max"]:.3f}'
+        f' +- {numerics["eps_max_error"]:.3f}'
+    )
+    print(
+        f'  E_shear, E_comp (Green-Lagrange, largest) {strain["E_shear_max"]:.3f},'
+        f' {strain["E_comp_max"]:.3f}'
+    )
+    print(
+        f'  muscle over both thresholds               '
+        f'{result["clusters"]["both"]["volume_mm3"]:.0f} mm3'
+    )
+    print(
+        f'  solved in {numerics["wall_s"]:.1f} s, {numerics["newton_iterations"]} Newton iterations'
+    )
     return 0
 
 
@@ -58,8 +66,11 @@ def main():
         print(f'solving, {100 * document["progress"]:.0f} % of the force …', flush=True)
         document = ask(address, document['links']['self'])
     status = show(document)
-    print(f'\nThe form:     {address}/\nThis side:    {address}{document["links"]["self"]}\n'
-          f'For programs: {address}/docs\nCtrl-C ends the service; its data stay in ./data.', flush=True)
+    print(
+        f'\nThe form:     {address}/\nThis side:    {address}{document["links"]["self"]}/report\n'
+        f'For programs: {address}/docs\nCtrl-C ends the service; its data stay in ./data.',
+        flush=True,
+    )
     return status
 
 

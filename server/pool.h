@@ -140,6 +140,7 @@ struct pool_stats {
     uint64_t renders, renders_failed;
     int renders_waiting;
 };
+
 /* What the pool is doing now and has done since it was created. Any thread. */
 void pool_stats(struct pool *pool, struct pool_stats *ret);
 

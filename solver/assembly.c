@@ -12,7 +12,7 @@ static void number_equations(struct assembly *a, const struct mesh *mesh)
         const bool bone = flags & NODE_ON_BONE;
         a->equation[n][0] = bone || flags & NODE_ON_X0 ? EQUATION_FIXED : a->n++;
         a->equation[n][1] = bone || flags & NODE_ON_Y0 ? EQUATION_FIXED : a->n++;
-        a->equation[n][2] = bone ? EQUATION_BONE : a->n++;
+        a->equation[n][2] = bone || flags & NODE_ON_PLATE ? EQUATION_BONE : a->n++;
     }
 }
 

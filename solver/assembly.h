@@ -27,6 +27,7 @@ struct assembly {
     struct linear *linear;
 };
 
+/* Numbers the equations of a valid mesh and analyses their pattern. ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code assembly_init(struct assembly *ret, const struct mesh *mesh,
                                                  struct ischia_error *err);
 void assembly_finish(struct assembly *assembly); /* a zeroed one is allowed */

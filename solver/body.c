@@ -81,7 +81,7 @@ static void scatter_stiffness(const int place[], const double K[HEX_DOFS][HEX_DO
 static bool touches_bone(const struct mesh *mesh, int e)
 {
     for (int k = 0; k < HEX_NODES; k++)
-        if (mesh->node_flags[mesh->hex[e][k]] & NODE_ON_BONE) return true;
+        if (mesh->node_flags[mesh->hex[e][k]] & (NODE_ON_BONE | NODE_ON_PLATE)) return true;
     return false;
 }
 

@@ -20,6 +20,7 @@ struct body {
     struct element_volume *volume; /* [element_count] of the last Hessian         */
 };
 
+/* At rest, tracked pressures zero. The mesh must outlive it. ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code body_init(struct body *ret, const struct mesh *mesh,
                                              const struct element_material material[TISSUE_COUNT],
                                              struct ischia_error *err);

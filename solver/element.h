@@ -5,7 +5,8 @@
 /*
  * The 8-node hexahedron with mean dilatation (Q1/P0, the pressure condensed out):
  *
- *   E(u) = sum_g w_g W(F_g) + V (kappa - kappa_s) / 2 (v / V - 1)^2 + sum_g w_g kappa_s / 2 (J_g - 1)^2
+ *   E(u) = sum_g w_g W(F_g) + V (kappa - kappa_s) / 2 (v / V - 1)^2
+ *          + sum_g w_g kappa_s / 2 (J_g - 1)^2
  *
  * with V the unloaded and v the deformed volume, W the isochoric Ogden energy. The third term is
  * the point-wise share of the volumetric energy: without it (kappa_s = 0) nothing keeps J_g from
@@ -21,7 +22,7 @@ struct element_material {
     double kappa_point_MPa; /* kappa_s above: its share at the points        */
 };
 
-/* Gradients of the shape functions with respect to X, [component][node], and weights det(dX/dxi). */
+/* Gradients of the shape functions by X, [component][node], and weights det(dX/dxi). */
 struct element_reference {
     double dN[HEX_POINTS][3][HEX_NODES]; /* 1/mm */
     double weight[HEX_POINTS];           /* mm3  */

@@ -21,11 +21,11 @@ static const char *const element_set[TISSUE_COUNT] = {
 };
 
 /*
- * Contact is by penalty in CalculiX. The normal stiffness lets the skin sink in by 1 um at the
- * highest pressures under a seated person (0.1 MPa), the stick slope lets it creep by 4 um.
+ * Contact is by penalty in CalculiX. The default normal stiffness lets the skin sink in by 1 um at
+ * the highest pressures under a seated person (0.1 MPa), the stick slope lets it creep by 4 um.
  */
-static const double contact_stiffness_MPa_mm = 100;
-static const double stick_slope_MPa_mm = 10;
+static const double default_contact_stiffness_MPa_mm = 100;
+static const double default_stick_slope_MPa_mm = 10;
 
 /* Young's modulus and Poisson's ratio of the seat's block; all its nodes are fixed, so any do. */
 static const double seat_E_MPa = 1000, seat_nu = 0.3;
@@ -172,14 +172,19 @@ free_work:
     return code;
 }
 
-static void write_contact(FILE *out, const struct mesh *mesh, double friction)
+static double given_or(double given, double otherwise) { return given > 0 ? given : otherwise; }
+
+static void write_contact(FILE *out, const struct mesh *mesh, const struct inp_model *model)
 {
     (void)fprintf(out,
                   "*SURFACE, NAME=SEATTOP, TYPE=ELEMENT\n%d, S2\n"
                   "*SURFACE INTERACTION, NAME=SEATCONTACT\n"
                   "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n%.12g\n",
-                  seat_element(mesh), contact_stiffness_MPa_mm);
-    if (friction > 0) (void)fprintf(out, "*FRICTION\n%.12g, %.12g\n", friction, stick_slope_MPa_mm);
+                  seat_element(mesh),
+                  given_or(model->contact_stiffness_MPa_mm, default_contact_stiffness_MPa_mm));
+    if (model->friction > 0)
+        (void)fprintf(out, "*FRICTION\n%.12g, %.12g\n", model->friction,
+                      given_or(model->stick_slope_MPa_mm, default_stick_slope_MPa_mm));
     (void)fputs("*CONTACT PAIR, INTERACTION=SEATCONTACT, TYPE=NODE TO SURFACE\nOUTSIDE, SEATTOP\n",
                 out);
 }
@@ -235,7 +240,7 @@ enum ischia_code inp_write(FILE *out, const struct mesh *mesh, const struct inp_
     write_properties(out, mesh, model);
     write_constraints(out, mesh, model->bone_slides);
     TRY(write_touching_surface(out, mesh, err));
-    write_contact(out, mesh, model->friction);
+    write_contact(out, mesh, model);
     write_step(out, model);
     if (fflush(out) != 0 || ferror(out))
         return FAIL(err, ISCHIA_E_IO, "cannot write the input deck: %s", strerror(errno));

@@ -36,8 +36,11 @@ struct inp_tissue {
 
 struct inp_model {
     struct inp_tissue tissue[TISSUE_COUNT];
-    double alpha;     /* W = 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) */
-    double friction;  /* Coulomb's coefficient; 0 leaves friction out           */
+    double alpha;    /* W = 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) */
+    double friction; /* Coulomb's coefficient; 0 leaves friction out           */
+    /* CalculiX's contact is by penalty: normal stiffness and stick slope in MPa/mm; 0 and 0 take
+     * 100 and 10, with which blocks converge. */
+    double contact_stiffness_MPa_mm, stick_slope_MPa_mm;
     bool bone_slides; /* BONE is held in z only: uniaxial blocks, for checks    */
     enum inp_drive drive;
     double drive_value;

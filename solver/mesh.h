@@ -20,10 +20,11 @@ extern const char *const tissue_names[TISSUE_COUNT];
 
 /* Bits of mesh.node_flags. */
 enum node_flag {
-    NODE_ON_BONE = 1, /* tied to the rigid bone                                    */
-    NODE_ON_X0 = 2,   /* symmetry plane x = 0: u_x = 0                             */
-    NODE_ON_Y0 = 4,   /* symmetry plane y = 0: u_y = 0                             */
-    NODE_ON_SEAT = 8  /* outer skin or outer side: may touch the seat              */
+    NODE_ON_BONE = 1,  /* tied to the rigid bone                                    */
+    NODE_ON_X0 = 2,    /* symmetry plane x = 0: u_x = 0                             */
+    NODE_ON_Y0 = 4,    /* symmetry plane y = 0: u_y = 0                             */
+    NODE_ON_SEAT = 8,  /* outer skin or outer side: may touch the seat              */
+    NODE_ON_PLATE = 16 /* moves with the bone in z and is free in x and y: a body to verify with */
 };
 
 /* How finely the blocks are divided. All counts are of elements. */

@@ -26,9 +26,9 @@
 #include "solver/mesh.h"
 
 const struct mesh_divisions mesh_divisions[ISCHIA_RESOLUTION_COUNT] = {
-    [ISCHIA_COARSE] = {.across = 6, .around = 3, .radial = 6, .fat = 3, .skin = 1},
-    [ISCHIA_STANDARD] = {.across = 12, .around = 5, .radial = 12, .fat = 5, .skin = 1},
-    [ISCHIA_FINE] = {.across = 18, .around = 8, .radial = 18, .fat = 8, .skin = 1},
+    [ISCHIA_COARSE] = {.across = 4, .around = 2, .radial = 4, .fat = 2, .skin = 1},
+    [ISCHIA_STANDARD] = {.across = 8, .around = 4, .radial = 8, .fat = 4, .skin = 1},
+    [ISCHIA_FINE] = {.across = 12, .around = 6, .radial = 12, .fat = 6, .skin = 1},
 };
 
 /* How far the core patch reaches over the quarter disc: along its axes, and at its corner. */
@@ -150,7 +150,7 @@ static void bowl_point(const struct local_geometry *g, double v, double q, doubl
 }
 
 /* The three patches of the quarter disc. Coordinates (a, b) in [0, 1]^2: in the core a is along x
- * and b along y; in the other two a is along the core's edge from its axis, b outward to the rim. */
+ * and b along y; in the others a is along the core's edge from its axis, b outward to the rim. */
 enum patch { PATCH_CORE, PATCH_X, PATCH_Y };
 
 static void core_disc_point(double a, double b, double ret[2])

@@ -93,8 +93,8 @@ enum ischia_code newton_create(struct newton **ret, struct body *body, struct as
     w->scratch = calloc(n + 1, sizeof *w->scratch);
     w->krylov = malloc(gmres_work_size(assembly->n + 1) * sizeof *w->krylov);
     w->keep = calloc(n, sizeof *w->keep);
-    if (!w->force || !w->trial || !w->saved || !w->normal_N || !w->saved_N || !w->border || !w->landing ||
-        !w->from_border || !w->direction || !w->scratch || !w->krylov || !w->keep) {
+    if (!w->force || !w->trial || !w->saved || !w->normal_N || !w->saved_N || !w->border ||
+        !w->landing || !w->from_border || !w->direction || !w->scratch || !w->krylov || !w->keep) {
         newton_destroy(w);
         return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the Newton iteration");
     }
@@ -250,8 +250,8 @@ static void load_exact_right_hand_side(struct newton *w, const struct newton_con
         double slip[2];
         if (eq[2] < 0 || !seat_slip_direction(w->seat, (const double(*)[3])w->trial, n, slip))
             continue;
-        const double change = w->seat->friction *
-                              (w->force[n][2] + w->scratch[eq[2]] - w->seat->normal_N[n]);
+        const double change =
+            w->seat->friction * (w->force[n][2] + w->scratch[eq[2]] - w->seat->normal_N[n]);
         for (int c = 0; c < 2; c++)
             if (eq[c] >= 0) ret[eq[c]] -= change * slip[c];
     }
@@ -320,8 +320,7 @@ static enum ischia_code factor_definite(struct newton *w, const struct equilibri
     const size_t rungs = sizeof convexity_ladder / sizeof convexity_ladder[0];
     *ret_definite = false;
     for (size_t i = 0; i < rungs && !*ret_definite; i++) {
-        if (i > 0)
-            linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[i], control);
+        if (i > 0) linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[i], control);
         TRY(factor(w, report, ret_definite, err));
     }
     return ISCHIA_OK;
@@ -408,7 +407,7 @@ static bool move_uninverted(struct newton *w, struct equilibrium *state, double 
 static void relag(struct newton *w, const struct equilibrium *state,
                   const struct newton_control *control)
 {
-    const double (*u)[3] = (const double(*)[3])state->u_mm;
+    const double(*u)[3] = (const double(*)[3])state->u_mm;
     double sum = 0;
     for (int n = 0; n < w->body->mesh->node_count; n++)
         for (int c = 0; c < 3; c++) {
@@ -593,7 +592,9 @@ enum ischia_code newton_tangent(struct newton *w, struct newton_tangent *ret,
     for (int n = 0; n < w->body->mesh->node_count; n++) {
         const int *eq = w->assembly->equation[n];
         for (int c = 0; c < 3; c++)
-            ret->direction[n][c] = eq[c] >= 0 ? w->direction[eq[c]] : eq[c] == EQUATION_BONE ? -1 : 0;
+            ret->direction[n][c] = eq[c] >= 0               ? w->direction[eq[c]]
+                                   : eq[c] == EQUATION_BONE ? -1
+                                                            : 0;
         ret->normal_rate_N_mm[n] =
             eq[2] >= 0 && !w->keep[eq[2]] ? w->scratch[eq[2]] + w->border[eq[2]] : 0;
     }

@@ -57,15 +57,14 @@ newton_minimise(struct newton *newton, struct equilibrium *state,
 /* Prepares for newton_tangent at a state that was not just minimised: at rest, or gone back to. */
 void newton_linearise(struct newton *newton, const struct equilibrium *state);
 
-struct newton_tangent { /* of the equilibrium with respect to d, friction limits held */
+struct newton_tangent {       /* of the equilibrium with respect to d, friction limits held */
     double stiffness_N_mm;    /* dF/dd; 0 when the tangent is not positive definite          */
     double (*direction)[3];   /* [node] du/dd; the caller's array                            */
     double *normal_rate_N_mm; /* [node] change of the contact forces; the caller's array     */
 };
 
 /* Factors the tangent of the state that the last minimisation or linearisation left. */
-ISCHIA_MUST_CHECK enum ischia_code newton_tangent(struct newton *newton,
-                                                  struct newton_tangent *ret,
+ISCHIA_MUST_CHECK enum ischia_code newton_tangent(struct newton *newton, struct newton_tangent *ret,
                                                   struct ischia_error *err);
 
 #endif

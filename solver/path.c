@@ -11,8 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double step_of_height = 0.06;    /* of the unloaded height             */
-static const double step_of_remaining = 0.15; /* of the height that is left         */
+static const double step_of_height = 0.08;    /* of the unloaded height             */
+static const double step_of_remaining = 0.18; /* of the height that is left         */
 static const double first_step = 0.01;        /* of the unloaded height             */
 static const double step_floor = 1e-4;        /* of the unloaded height: give up    */
 static const double path_tolerance = 1e-5;
@@ -30,10 +30,10 @@ struct path {
     const struct path_observer *observer;
     struct equilibrium *state;
     struct path_report *report;
-    struct path_point last; /* the last converged step                     */
-    double (*u_mm)[3];      /* [node] displacements there                  */
+    struct path_point last;        /* the last converged step                     */
+    double (*u_mm)[3];             /* [node] displacements there                  */
     struct newton_tangent tangent; /* there                                */
-    double *normal_N;       /* [node] contact forces there                 */
+    double *normal_N;              /* [node] contact forces there                 */
     double height_mm;
     double target_N;
     double work_Nmm;
@@ -57,8 +57,8 @@ static enum ischia_code path_init(struct path *p, struct ischia_error *err)
     p->tangent.direction = calloc(nodes, sizeof *p->tangent.direction);
     p->tangent.normal_rate_N_mm = calloc(nodes, sizeof *p->tangent.normal_rate_N_mm);
     p->normal_N = calloc(nodes, sizeof *p->normal_N);
-    CHECK(p->u_mm && p->tangent.direction && p->tangent.normal_rate_N_mm && p->normal_N, err, ISCHIA_E_MEMORY,
-          "not enough memory for the load path");
+    CHECK(p->u_mm && p->tangent.direction && p->tangent.normal_rate_N_mm && p->normal_N, err,
+          ISCHIA_E_MEMORY, "not enough memory for the load path");
     return newton_create(&p->newton, p->body, p->assembly, p->seat, err);
 }
 
@@ -111,7 +111,7 @@ static enum ischia_code book(struct path *p, struct ischia_error *err)
     now.stiffness_N_mm = p->tangent.stiffness_N_mm;
     p->work_Nmm += step * (p->last.force_N + now.force_N) / 2 +
                    step * step / 12 * (p->last.stiffness_N_mm - now.stiffness_N_mm);
-    p->friction_Nmm += seat_advance(p->seat, (const double(*)[3])p->state->u_mm);
+    p->friction_Nmm += seat_advance(p->seat, (const double(*)[3])p->state->u_mm, p->normal_N);
     p->last = now;
     memcpy(p->u_mm, p->state->u_mm, sizeof *p->u_mm * (size_t)p->nodes);
     memcpy(p->normal_N, p->seat->normal_N, sizeof *p->normal_N * (size_t)p->nodes);

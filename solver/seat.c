@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Stiffness of the sticking springs per unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
+/* Stiffness of the sticking springs by unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
 static const double stick_stiffness_MPa_mm = 0.25;
 
 /* The outer skin starts resting on the seat: pressed by a force too small to matter, but not zero. */
@@ -46,8 +46,7 @@ enum ischia_code seat_init(struct seat *ret, const struct mesh *mesh, double fri
     }
     set_stick_stiffness(&s, mesh);
     for (int n = 0; n < node_count; n++)
-        if (mesh->node_flags[n] & NODE_ON_SEAT && mesh->X_mm[n][2] <= 0)
-            s.normal_N[n] = resting_N;
+        if (mesh->node_flags[n] & NODE_ON_SEAT && mesh->X_mm[n][2] <= 0) s.normal_N[n] = resting_N;
     *ret = s;
     return ISCHIA_OK;
 }
@@ -147,8 +146,8 @@ bool seat_slip_direction(const struct seat *seat, const double (*u)[3], int n, d
     return true;
 }
 
-void seat_add_normal_change(const struct seat *seat, const struct assembly *a,
-                            const double (*u)[3], double *change_N)
+void seat_add_normal_change(const struct seat *seat, const struct assembly *a, const double (*u)[3],
+                            double *change_N)
 {
     for (int n = 0; n < seat->node_count; n++) {
         const int *eq = a->equation[n];
@@ -159,16 +158,17 @@ void seat_add_normal_change(const struct seat *seat, const struct assembly *a,
     }
 }
 
-double seat_advance(struct seat *seat, const double (*u)[3])
+double seat_advance(struct seat *seat, const double (*u)[3], const double *normal_before_N)
 {
     double dissipated = 0;
     for (int n = 0; n < seat->node_count; n++) {
         const struct spring s = spring_of(seat, seat->normal_N[n], u, n);
         if (seat->normal_N[n] > 0 && s.r <= s.slip_r) continue;
         const double slip = s.r > 0 ? 1 - s.slip_r / s.r : 0;
+        const double mean_N = (seat->normal_N[n] + normal_before_N[n]) / 2;
         seat->anchor_mm[n][0] += slip * s.dx;
         seat->anchor_mm[n][1] += slip * s.dy;
-        dissipated += seat->friction * seat->normal_N[n] * slip * s.r;
+        if (seat->normal_N[n] > 0) dissipated += seat->friction * mean_N * slip * s.r;
     }
     return dissipated;
 }

@@ -29,6 +29,7 @@ struct seat {
     int node_count;
 };
 
+/* Nothing pressed, anchors where the unloaded nodes are. ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code seat_init(struct seat *ret, const struct mesh *mesh,
                                              double friction, struct ischia_error *err);
 void seat_finish(struct seat *seat);
@@ -70,8 +71,9 @@ bool seat_slip_direction(const struct seat *seat, const double (*u_mm)[3], int n
 
 /*
  * Ends a load step: anchors of slipping nodes follow, those of nodes off the seat move along.
- * Returns the energy dissipated by the slip, N mm.
+ * Returns the energy dissipated by the slip, N mm: mu times slip times the mean of the contact force
+ * before (normal_before_N[node]) and after the step, which is of second order in the step.
  */
-double seat_advance(struct seat *seat, const double (*u_mm)[3]);
+double seat_advance(struct seat *seat, const double (*u_mm)[3], const double *normal_before_N);
 
 #endif

@@ -39,6 +39,7 @@ ISCHIA_MUST_CHECK enum ischia_code crew_start(struct crew *ret, int count,
                                               struct ischia_error *err);
 void crew_stop(struct crew *crew); /* ends them all, working or not */
 
+/* True when a member waits for work; when one has some. */
 bool crew_has_idle(const struct crew *crew);
 bool crew_is_working(const struct crew *crew);
 

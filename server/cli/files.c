@@ -56,7 +56,7 @@ static enum ischia_code read_stream(FILE *in, const char *path, size_t bytes_max
 enum ischia_code file_read(const char *path, size_t bytes_max, char **ret_text, size_t *ret_length,
                            struct ischia_error *err)
 {
-    FILE *in;
+    FILE *in = NULL;
     TRY(file_open(path, &in, err));
     const char *name = in == stdin ? "standard input" : path;
     const enum ischia_code code = read_stream(in, name, bytes_max, ret_text, ret_length, err);

@@ -30,9 +30,9 @@ struct cli_usage {
 enum cli_parse { CLI_RUN, CLI_HELP_SHOWN, CLI_BAD_USAGE };
 
 /*
- * Reads argv[1] and on. Operands go to ret_operands[0 ... operands_max - 1], which keep their values
- * when there are fewer. CLI_HELP_SHOWN after --help (on stdout); CLI_BAD_USAGE after a message
- * on stderr that names the word and what is accepted.
+ * Reads argv[1] and on. Operands go to ret_operands[0 ... operands_max - 1], which keep their
+ * values when there are fewer. CLI_HELP_SHOWN after --help (on stdout); CLI_BAD_USAGE after a
+ * message on stderr that names the word and what is accepted.
  */
 enum cli_parse cli_parse_options(const struct cli_usage *usage, int argc, char **argv,
                                  const char **ret_operands);

@@ -218,10 +218,14 @@ void handle_asset(struct call *call, struct http_response *ret)
 void handle_home(struct call *call, struct http_response *ret)
 {
     const struct asset *page = asset_find("index.html");
-    if (page != NULL)
+    if (page != NULL) {
         page_asset(call, page, ret);
-    else
+    } else if (call->id_text[0] != '\0') {
+        ret->status = 303;
+        http_header(ret, "Location", "/v1/assessments/%s/report", call->id_text);
+    } else {
         page_form(call, NULL, 0, NULL, ret);
+    }
 }
 
 void handle_form(struct call *call, struct http_response *ret)

@@ -132,10 +132,7 @@ static int match_entry(const char *entry, size_t length, const char *type, doubl
     int specific = -1;
     if (name == strlen(type) && strncasecmp(entry, type, name) == 0)
         specific = 2;
-    else if (name == 3 && strncmp(entry,
-                                  "*"
-                                  "/*",
-                                  3) == 0)
+    else if (name == 3 && entry[0] == '*' && entry[1] == '/' && entry[2] == '*')
         specific = 0;
     else if (slash != NULL && name == (size_t)(slash - type) + 2 && entry[name - 1] == '*' &&
              strncasecmp(entry, type, name - 1) == 0)

@@ -262,6 +262,7 @@ struct store_retention {
     int64_t age_max_ms; /* finished longer ago than this: erased; 0: keep                     */
     int64_t count_max;  /* finished ones beyond the newest this many: erased; 0: keep         */
 };
+
 /* Erases at most `batch` finished assessments that the rule no longer keeps, and the idempotency
  * keys that have expired; call again while *ret_erased == batch. */
 ISCHIA_MUST_CHECK enum ischia_code store_retire(struct store *store,
@@ -325,6 +326,7 @@ ISCHIA_MUST_CHECK enum ischia_code store_audit_append_later(struct store *store,
                                                             struct ischia_error *err);
 
 typedef bool store_on_audit(void *context, const struct store_audit *row);
+
 /* Rows after `since` in order. */
 ISCHIA_MUST_CHECK enum ischia_code store_audit_list(struct store *store, int64_t since,
                                                     store_on_audit *on_row, void *context,
@@ -336,6 +338,7 @@ struct store_audit_report {
     int64_t head_seq;
     unsigned char head_hash[STORE_DIGEST_BYTES];
 };
+
 /* Walks the chain. ISCHIA_OK also for a broken one: look at first_bad_seq. */
 ISCHIA_MUST_CHECK enum ischia_code
 store_audit_verify(struct store *store, struct store_audit_report *ret, struct ischia_error *err);
@@ -354,6 +357,7 @@ struct store_stats {
     uint64_t latency_count[STORE_LATENCY_BUCKETS]; /* write calls by time from call to commit */
     double latency_sum_ms;
 };
+
 /* Numbers for metrics; cheap however many assessments there are. */
 ISCHIA_MUST_CHECK enum ischia_code store_stats(struct store *store, struct store_stats *ret,
                                                struct ischia_error *err);

@@ -153,6 +153,7 @@ struct sqlite_paths {
     char database[SQLITE_PATH_BYTES];
     char lock[SQLITE_PATH_BYTES];
 };
+
 /* ISCHIA_E_INPUT: no name, or one that is too long. */
 ISCHIA_MUST_CHECK enum ischia_code sqlite_paths_of(const char *location, struct sqlite_paths *ret,
                                                    struct ischia_error *err);

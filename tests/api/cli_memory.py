@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The program with its 1st, 2nd, 3rd ... allocation failing: it says so and ends, or does without."""
+"""The program with its 1st, 2nd, 3rd ... allocation failing: it says so and ends, or copes."""
 import json
 import os
 

@@ -38,8 +38,9 @@ class Answer:
 
 def admin(state, *words, check=True):
     """Runs an administration command; returns its standard output."""
-    done = subprocess.run([PROGRAM, '--state-dir', state, *words], capture_output=True, text=True,
-                          timeout=60)
+    done = subprocess.run(
+        [PROGRAM, '--state-dir', state, *words], capture_output=True, text=True, timeout=60
+    )
     if check and done.returncode != 0:
         raise AssertionError(f'{words}: {done.returncode}: {done.stderr}')
     return done.stdout if check else done
@@ -51,9 +52,25 @@ class Service:
         self.state = state or tempfile.mkdtemp(prefix='ischia-test-')
         self.log = open(os.path.join(self.state, 'stderr.txt'), 'ab')
         self.process = subprocess.Popen(
-            [PROGRAM, '--listen', listen, '--state-dir', self.state, '--worker-program', worker,
-             '--workers', '1', '--drain-timeout', '2', *options],
-            stdout=subprocess.PIPE, stderr=self.log, text=True, env={**os.environ, **(env or {})})
+            [
+                PROGRAM,
+                '--listen',
+                listen,
+                '--state-dir',
+                self.state,
+                '--worker-program',
+                worker,
+                '--workers',
+                '1',
+                '--drain-timeout',
+                '2',
+                *options,
+            ],
+            stdout=subprocess.PIPE,
+            stderr=self.log,
+            text=True,
+            env={**os.environ, **(env or {})},
+        )
         line = self.process.stdout.readline()
         if not line.startswith('listening on '):
             self.process.wait(10)

@@ -19,12 +19,17 @@ FORM = {'Content-Type': 'application/x-www-form-urlencoded'}
 
 def install_validators():
     """npm ci, unless what the lock file names is there already."""
-    lock, done = (os.path.join(HERE, name) for name in
-                  ('package-lock.json', 'node_modules/.ischia-lock'))
+    lock, done = (
+        os.path.join(HERE, name) for name in ('package-lock.json', 'node_modules/.ischia-lock')
+    )
     if os.path.exists(done) and filecmp.cmp(lock, done, shallow=False):
         return
-    subprocess.run(['npm', 'ci', '--ignore-scripts', '--no-audit', '--no-fund', '--loglevel=error'],
-                   cwd=HERE, check=True, timeout=240)
+    subprocess.run(
+        ['npm', 'ci', '--ignore-scripts', '--no-audit', '--no-fund', '--loglevel=error'],
+        cwd=HERE,
+        check=True,
+        timeout=240,
+    )
     shutil.copyfile(lock, done)
 
 
@@ -47,14 +52,18 @@ class Contract(unittest.TestCase):
                     yield method, path, item[method]
 
     def test_the_routes_are_those_of_the_program(self):
-        listed = subprocess.run([PROGRAM, '--print-routes'], capture_output=True, text=True, check=True)
+        listed = subprocess.run(
+            [PROGRAM, '--print-routes'], capture_output=True, text=True, check=True
+        )
         program = {}
         for line in listed.stdout.splitlines():
             method, path, *rest = line.split()
             if rest[0] != 'page':
                 program[(method.lower(), path)] = rest[0]
-        contract = {(method, path): operation.get('x-scope', 'open')
-                    for method, path, operation in self.operations()}
+        contract = {
+            (method, path): operation.get('x-scope', 'open')
+            for method, path, operation in self.operations()
+        }
         self.assertEqual(contract, program)
 
     def test_the_limits_are_those_of_the_tables(self):
@@ -62,17 +71,24 @@ class Contract(unittest.TestCase):
         served = self.service.get('/v1/parameters').json()
         for parameter in served['parameters']:
             for schema in (schemas['Request'], schemas['Assessment']['properties']['parameters']):
-                for key in [parameter['key']] + (parameter['aliases'] if schema is schemas['Request'] else []):
+                for key in [parameter['key']] + (
+                    parameter['aliases'] if schema is schemas['Request'] else []
+                ):
                     limits = schema['properties'][key]
-                    self.assertEqual((limits['minimum'], limits['maximum']),
-                                     (parameter['accepted']['min'], parameter['accepted']['max']), key)
+                    self.assertEqual(
+                        (limits['minimum'], limits['maximum']),
+                        (parameter['accepted']['min'], parameter['accepted']['max']),
+                        key,
+                    )
         request = schemas['Request']['properties']
         for option in served['options']:
             group = request[option['group']]
             group = group['oneOf'][1] if 'oneOf' in group else group
             limits = group['properties'][option['key']]
-            self.assertEqual((limits['minimum'], limits['maximum'], limits['default']),
-                             (option['accepted']['min'], option['accepted']['max'], option['default']))
+            self.assertEqual(
+                (limits['minimum'], limits['maximum'], limits['default']),
+                (option['accepted']['min'], option['accepted']['max'], option['default']),
+            )
         self.assertEqual(request['resolution']['enum'], [r['name'] for r in served['resolutions']])
 
     def test_the_query_parameters_are_taken_and_no_others(self):
@@ -91,13 +107,26 @@ class Contract(unittest.TestCase):
 
         def ask(method, path, template, body=None, headers=None):
             answer = self.service.ask(method, path, body, headers)
-            asked.append({'method': method.lower(), 'path': template, 'status': answer.status,
-                          'type': answer.type, 'headers': sorted(h.lower() for h in answer.headers),
-                          'body': answer.body.decode()})
+            asked.append(
+                {
+                    'method': method.lower(),
+                    'path': template,
+                    'status': answer.status,
+                    'type': answer.type,
+                    'headers': sorted(h.lower() for h in answer.headers),
+                    'body': answer.body.decode(),
+                }
+            )
             return answer
 
         many = '/v1/assessments'
-        made = ask('POST', many, many, side(F=400.5, subject='T-1', side='left', R2=80), {'Prefer': 'wait=20'})
+        made = ask(
+            'POST',
+            many,
+            many,
+            side(F=400.5, subject='T-1', side='left', R2=80),
+            {'Prefer': 'wait=20'},
+        )
         ask('POST', many, many, side(F=401.5))
         ask('POST', many, many, side(muM=99))
         ask('POST', many, many, b'{', JSON)
@@ -118,17 +147,36 @@ class Contract(unittest.TestCase):
             for suffix in ('', '/report', '/section.svg', '/field.vtu'):
                 answer = ask('GET', path + suffix, one + suffix)
                 if 'ETag' in answer.headers:
-                    ask('GET', path + suffix, one + suffix, headers={'If-None-Match': answer.headers['ETag']})
+                    ask(
+                        'GET',
+                        path + suffix,
+                        one + suffix,
+                        headers={'If-None-Match': answer.headers['ETag']},
+                    )
         ask('GET', failed.json()['links']['self'] + '/events', one + '/events')
         ask('DELETE', hanging.json()['links']['self'], one)
         ask('POST', hanging.json()['links']['self'] + '/cancel', one + '/cancel')
         ask('POST', made.json()['links']['self'] + '/cancel', one + '/cancel')
         ask('DELETE', made.json()['links']['self'], one)
-        for suffix, method in (('', 'GET'), ('', 'DELETE'), ('/cancel', 'POST'), ('/events', 'GET'),
-                               ('/report', 'GET'), ('/field.vtu', 'GET'), ('/section.svg', 'GET')):
+        for suffix, method in (
+            ('', 'GET'),
+            ('', 'DELETE'),
+            ('/cancel', 'POST'),
+            ('/events', 'GET'),
+            ('/report', 'GET'),
+            ('/field.vtu', 'GET'),
+            ('/section.svg', 'GET'),
+        ):
             ask(method, made.json()['links']['self'] + suffix, one + suffix)
-        for path in ('/v1/parameters', '/v1/changes', '/openapi.json', '/healthz', '/readyz', '/metrics',
-                     '/version'):
+        for path in (
+            '/v1/parameters',
+            '/v1/changes',
+            '/openapi.json',
+            '/healthz',
+            '/readyz',
+            '/metrics',
+            '/version',
+        ):
             ask('GET', path, path)
             ask('PUT', path, path)
             ask('GET', path, path, headers={'Accept': 'image/png'})
@@ -144,8 +192,12 @@ class Contract(unittest.TestCase):
             for name, content in zip(files, (self.contract, asked)):
                 with open(name, 'w', encoding='utf-8') as file:
                     json.dump(content, file)
-            checked = subprocess.run(['node', os.path.join(HERE, 'contract.mjs'), *files],
-                                     capture_output=True, text=True, timeout=120)
+            checked = subprocess.run(
+                ['node', os.path.join(HERE, 'contract.mjs'), *files],
+                capture_output=True,
+                text=True,
+                timeout=120,
+            )
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
         self.assertIn(f'{len(asked)} answers fit', checked.stdout)
 

@@ -33,33 +33,57 @@ def route_of(line):
 
 class Docs(unittest.TestCase):
     def test_every_route_has_a_curl_line(self):
-        listed = subprocess.run([PROGRAM, '--print-routes'], capture_output=True, text=True, check=True)
-        routes = {tuple(line.split()[:2]) for line in listed.stdout.splitlines() if ' page ' not in line}
+        listed = subprocess.run(
+            [PROGRAM, '--print-routes'], capture_output=True, text=True, check=True
+        )
+        routes = {
+            tuple(line.split()[:2]) for line in listed.stdout.splitlines() if ' page ' not in line
+        }
         self.assertEqual(routes, {route_of(line) for line in curl_lines()})
 
     def test_every_curl_line_works(self):
         with Service() as service, tempfile.TemporaryDirectory() as folder:
             service.until_ready()
-            environment = {**os.environ, 'ISCHIA': 'http://' + service.address,
-                           'ID': service.submit(F=250.5, subject='P-017', side='left')['id'],
-                           'RUNNING': service.submit(wait=0, F=599)['id']}
+            environment = {
+                **os.environ,
+                'ISCHIA': 'http://' + service.address,
+                'ID': service.submit(F=250.5, subject='P-017', side='left')['id'],
+                'RUNNING': service.submit(wait=0, F=599)['id'],
+            }
             lines = sorted(curl_lines(), key=lambda line: '/cancel' not in line)
             for line in lines:
-                done = subprocess.run(['bash', '-c', line], env=environment, cwd=folder, timeout=60,
-                                      capture_output=True, text=True)
+                done = subprocess.run(
+                    ['bash', '-c', line],
+                    env=environment,
+                    cwd=folder,
+                    timeout=60,
+                    capture_output=True,
+                    text=True,
+                )
                 self.assertEqual(done.returncode, 0, f'{line}\n{done.stderr}')
             self.assertTrue(os.path.getsize(os.path.join(folder, 'report.html')) > 0)
 
     def test_the_manual_lists_the_options_of_the_program(self):
-        printed = subprocess.run([PROGRAM, '--print-man'], capture_output=True, text=True, check=True)
-        self.assertIn(printed.stdout, read('docs/man/ischiad.8'),
-                      'write the output of `ischiad --print-man` into docs/man/ischiad.8')
+        printed = subprocess.run(
+            [PROGRAM, '--print-man'], capture_output=True, text=True, check=True
+        )
+        self.assertIn(
+            printed.stdout,
+            read('docs/man/ischiad.8'),
+            'write the output of `ischiad --print-man` into docs/man/ischiad.8',
+        )
 
     def test_the_sample_configuration_is_the_default(self):
         sample = os.path.join(ROOT, 'deploy/ischiad.conf')
-        given = subprocess.run([PROGRAM, '--config', sample, '--print-config'], capture_output=True,
-                               text=True, check=True)
-        usual = subprocess.run([PROGRAM, '--print-config'], capture_output=True, text=True, check=True)
+        given = subprocess.run(
+            [PROGRAM, '--config', sample, '--print-config'],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        usual = subprocess.run(
+            [PROGRAM, '--print-config'], capture_output=True, text=True, check=True
+        )
         self.assertEqual(given.stdout, usual.stdout)
 
     def test_operations_names_every_metric(self):

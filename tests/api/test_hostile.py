@@ -19,8 +19,16 @@ BODY = json.dumps(side(F=130.5)).encode()
 class Hostile(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.service = Service('--request-timeout', '2', '--idle-timeout', '4',
-                              '--connections', '300', '--connections-per-address', '250')
+        cls.service = Service(
+            '--request-timeout',
+            '2',
+            '--idle-timeout',
+            '4',
+            '--connections',
+            '300',
+            '--connections-per-address',
+            '250',
+        )
         cls.service.until_ready()
         host, port = cls.service.address.split(':')
         cls.where = (host, int(port))
@@ -30,7 +38,7 @@ class Hostile(unittest.TestCase):
         cls.service.stop()
 
     def setUp(self):
-        """What the test before left behind is gone soon: well before any timeout but the quick ones."""
+        """What the test before left behind is gone soon."""
         end = time.monotonic() + 8
         while self.connections() > 3:
             self.assertLess(time.monotonic(), end, 'connections that were left are kept')
@@ -46,8 +54,12 @@ class Hostile(unittest.TestCase):
     def test_those_who_leave_in_the_middle_are_forgotten(self):
         with Service('--request-timeout', '3000', '--idle-timeout', '3000') as service:
             host, port = service.address.split(':')
-            for text in (b'', b'GET /hea', b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
-                         b'Content-Type: application/json\r\nContent-Length: 99\r\n\r\n{'):
+            for text in (
+                b'',
+                b'GET /hea',
+                b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+                b'Content-Type: application/json\r\nContent-Length: 99\r\n\r\n{',
+            ):
                 for _ in range(20):
                     connection = socket.create_connection((host, int(port)), timeout=10)
                     connection.sendall(text)
@@ -103,8 +115,10 @@ class Hostile(unittest.TestCase):
 
     def test_a_slow_body_is_408(self):
         connection = self.open()
-        connection.sendall(b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
-                           b'Content-Type: application/json\r\nContent-Length: 200\r\n\r\n{')
+        connection.sendall(
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\nContent-Length: 200\r\n\r\n{'
+        )
         text = self.read_all(connection)
         self.assertTrue(text.startswith(b'HTTP/1.1 408 '), text)
         head, body = text.split(b'\r\n\r\n', 1)
@@ -115,16 +129,20 @@ class Hostile(unittest.TestCase):
     def test_half_a_body_and_gone(self):
         for _ in range(50):
             connection = self.open()
-            connection.sendall(b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
-                               b'Content-Type: application/json\r\nContent-Length: 500\r\n\r\n' + BODY)
+            connection.sendall(
+                b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+                b'Content-Type: application/json\r\nContent-Length: 500\r\n\r\n' + BODY
+            )
             connection.close()
         self.alive_within(1)
         self.assertNotIn('130.5', self.service.get('/v1/assessments').body.decode())
 
     def test_an_endless_body_is_ended(self):
         connection = self.open()
-        connection.sendall(b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
-                           b'Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n')
+        connection.sendall(
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n'
+        )
         sent = 0
         try:
             while sent < 64 << 20:
@@ -137,7 +155,9 @@ class Hostile(unittest.TestCase):
         self.alive_within(1)
 
     def test_a_huge_head_is_refused(self):
-        text = self.raw(b'GET / HTTP/1.1\r\nHost: localhost\r\n' + b'X-A: ' + b'a' * 20000 + b'\r\n\r\n')
+        text = self.raw(
+            b'GET / HTTP/1.1\r\nHost: localhost\r\n' + b'X-A: ' + b'a' * 20000 + b'\r\n\r\n'
+        )
         self.assertTrue(text.startswith(b'HTTP/1.1 431 '), text[:80])
         self.assertIn(b'application/problem+json', text)
         text = self.raw(b'GET /' + b'a' * 100000 + b' HTTP/1.1\r\nHost: localhost\r\n\r\n')
@@ -145,11 +165,17 @@ class Hostile(unittest.TestCase):
         self.alive_within(1)
 
     def test_what_is_not_http_is_refused(self):
-        for text in (b'\0' * 100, b'GET\r\n\r\n', b'GET / HTTP/9.9\r\n\r\n', b'\x16\x03\x01\x02\x00\x01',
-                     b'GET / HTTP/1.1\r\n\r\n', b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
-                     b'Content-Length: -1\r\n\r\n', b'GET /%00 HTTP/1.1\r\nHost: localhost\r\n\r\n',
-                     b'GET /%2e%2e/%2e%2e/etc/passwd HTTP/1.1\r\nHost: localhost\r\n\r\n',
-                     b'BREW / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n'):
+        for text in (
+            b'\0' * 100,
+            b'GET\r\n\r\n',
+            b'GET / HTTP/9.9\r\n\r\n',
+            b'\x16\x03\x01\x02\x00\x01',
+            b'GET / HTTP/1.1\r\n\r\n',
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n' b'Content-Length: -1\r\n\r\n',
+            b'GET /%00 HTTP/1.1\r\nHost: localhost\r\n\r\n',
+            b'GET /%2e%2e/%2e%2e/etc/passwd HTTP/1.1\r\nHost: localhost\r\n\r\n',
+            b'BREW / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n',
+        ):
             connection = self.open()
             connection.sendall(text)
             connection.shutdown(socket.SHUT_WR)
@@ -158,15 +184,19 @@ class Hostile(unittest.TestCase):
         self.alive_within(1)
 
     def test_two_lengths_do_not_smuggle_a_request(self):
-        text = self.raw(b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
-                        b'Content-Type: application/json\r\nContent-Length: 4\r\n'
-                        b'Transfer-Encoding: chunked\r\nConnection: close\r\n\r\n'
-                        b'0\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n')
+        text = self.raw(
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\nContent-Length: 4\r\n'
+            b'Transfer-Encoding: chunked\r\nConnection: close\r\n\r\n'
+            b'0\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n'
+        )
         self.assertNotIn(b'alive', text)
 
     def test_pipelined_requests_are_answered_in_order(self):
-        text = self.raw(b'GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n' * 5 +
-                        b'GET /version HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n')
+        text = self.raw(
+            b'GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n' * 5
+            + b'GET /version HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n'
+        )
         self.assertEqual(text.count(b'HTTP/1.1 200 OK'), 6)
         self.assertGreater(text.index(b'"program"'), text.rindex(b'alive'))
 
@@ -213,21 +243,26 @@ class Hostile(unittest.TestCase):
         path = document['links']['self'].encode()
         for _ in range(50):
             connection = self.open()
-            connection.sendall(b'GET ' + path + b' HTTP/1.1\r\nHost: localhost\r\nPrefer: wait=30\r\n\r\n')
+            connection.sendall(
+                b'GET ' + path + b' HTTP/1.1\r\nHost: localhost\r\nPrefer: wait=30\r\n\r\n'
+            )
             connection.close()
         self.assertEqual(self.service.ask('POST', path.decode() + '/cancel').status, 200)
         self.alive_within(1)
 
     def test_noise(self):
         rng = random.Random(7)
-        good = (b'POST /v1/assessments?x=1 HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n'
-                b'Content-Length: %d\r\n\r\n' % len(BODY)) + BODY
+        good = (
+            b'POST /v1/assessments?x=1 HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\n'
+            b'Content-Length: %d\r\n\r\n' % len(BODY)
+        ) + BODY
         for _ in range(150):
             text = bytearray(good)
             for _ in range(rng.randint(1, 8)):
                 text[rng.randrange(len(text))] = rng.randrange(256)
             connection = self.open()
-            connection.sendall(bytes(text[:rng.randint(1, len(text))]))
+            connection.sendall(bytes(text[: rng.randint(1, len(text))]))
             connection.close()
         self.alive_within(1)
 
@@ -243,13 +278,16 @@ class Stopping(unittest.TestCase):
         def wait():
             answer = service.ask('GET', document['links']['self'], headers={'Prefer': 'wait=20'})
             waited.append(answer.json()['status'])
+
         thread = threading.Thread(target=wait)
         thread.start()
         time.sleep(0.2)
         service.signal(signal.SIGTERM)
         time.sleep(0.2)
         refused = service.ask('POST', '/v1/assessments', side())
-        self.assertEqual((refused.status, refused.json()['type']), (503, '/docs#problem-unavailable'))
+        self.assertEqual(
+            (refused.status, refused.json()['type']), (503, '/docs#problem-unavailable')
+        )
         self.assertTrue(refused.headers['Retry-After'])
         self.assertEqual(service.ask('GET', '/readyz').status, 503)
         thread.join()
@@ -265,7 +303,9 @@ class Stopping(unittest.TestCase):
         service.own_state = False
         service.stop()
         with Service(state=service.state) as again:
-            self.assertEqual(again.ask('POST', f'/v1/assessments/{running["id"]}/cancel').status, 200)
+            self.assertEqual(
+                again.ask('POST', f'/v1/assessments/{running["id"]}/cancel').status, 200
+            )
             for identity in queued:
                 again.until(identity, 'succeeded')
             again.own_state = True

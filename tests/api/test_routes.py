@@ -43,7 +43,9 @@ class Routes(unittest.TestCase):
     # ------------------------------------------------------------------ submit
 
     def test_a_submission_is_accepted_and_solved(self):
-        answer = self.service.ask('POST', '/v1/assessments', side(F=200.5, subject='P-1', side='left'))
+        answer = self.service.ask(
+            'POST', '/v1/assessments', side(F=200.5, subject='P-1', side='left')
+        )
         self.assertEqual(answer.status, 202)
         document = answer.json()
         self.assertEqual(answer.headers['Location'], '/v1/assessments/' + document['id'])
@@ -61,11 +63,15 @@ class Routes(unittest.TestCase):
 
     def test_prefer_wait_gives_up_in_time(self):
         begun = time.monotonic()
-        answer = self.service.ask('POST', '/v1/assessments', side(F=599, eM=30), {'Prefer': 'wait=1'})
+        answer = self.service.ask(
+            'POST', '/v1/assessments', side(F=599, eM=30), {'Prefer': 'wait=1'}
+        )
         self.assertEqual(answer.status, 202)
         self.assertLess(time.monotonic() - begun, 5)
         self.assertGreaterEqual(time.monotonic() - begun, 0.9)
-        self.assertEqual(self.service.ask('POST', answer.headers['Location'] + '/cancel').status, 200)
+        self.assertEqual(
+            self.service.ask('POST', answer.headers['Location'] + '/cancel').status, 200
+        )
 
     def test_greek_spellings_are_the_same(self):
         for spelling in ('\u03bcM', '\u00b5M'):
@@ -88,25 +94,44 @@ class Routes(unittest.TestCase):
             self.problem(answer, 400)
 
     def test_all_faults_come_at_once(self):
-        answer = self.service.ask('POST', '/v1/assessments',
-                                  side(muM=80, F='258', R1=None, muN=3, subject='Jane Doe', side='up'))
-        self.assertEqual(self.errors(answer), {
-            ('/muM', 'out_of_range'), ('/F', 'wrong_type'), ('/R1', 'missing'), ('/muN', 'unknown'),
-            ('/subject', 'malformed'), ('/side', 'not_allowed')})
+        answer = self.service.ask(
+            'POST',
+            '/v1/assessments',
+            side(muM=80, F='258', R1=None, muN=3, subject='Jane Doe', side='up'),
+        )
+        self.assertEqual(
+            self.errors(answer),
+            {
+                ('/muM', 'out_of_range'),
+                ('/F', 'wrong_type'),
+                ('/R1', 'missing'),
+                ('/muN', 'unknown'),
+                ('/subject', 'malformed'),
+                ('/side', 'not_allowed'),
+            },
+        )
 
     def test_a_duplicate_key_is_refused(self):
         body = json.dumps(SIDE)[:-1] + ', "F": 200}'
-        self.assertIn(('/F', 'duplicate'), self.errors(
-            self.service.ask('POST', '/v1/assessments', body.encode(), JSON)))
+        self.assertIn(
+            ('/F', 'duplicate'),
+            self.errors(self.service.ask('POST', '/v1/assessments', body.encode(), JSON)),
+        )
 
     def test_another_media_type_is_415(self):
-        self.problem(self.service.ask('POST', '/v1/assessments', b'x', {'Content-Type': 'text/xml'}), 415)
+        self.problem(
+            self.service.ask('POST', '/v1/assessments', b'x', {'Content-Type': 'text/xml'}), 415
+        )
         self.problem(self.service.ask('POST', '/v1/assessments', b'x', {}), 415)
 
     def test_too_large_a_body_is_413(self):
         for size in (64 * 1024 + 1, 3 * 1024 * 1024):
-            answer = self.service.ask('POST', '/v1/assessments', b' ' * 10, {
-                **JSON, 'Content-Length': str(size), 'Expect': '100-continue'})
+            answer = self.service.ask(
+                'POST',
+                '/v1/assessments',
+                b' ' * 10,
+                {**JSON, 'Content-Length': str(size), 'Expect': '100-continue'},
+            )
             self.problem(answer, 413)
         answer = self.service.ask('POST', '/v1/assessments', b' ' * (64 * 1024 + 1), JSON)
         self.problem(answer, 413)
@@ -127,12 +152,15 @@ class Routes(unittest.TestCase):
         self.assertEqual(first.json()['id'], again.json()['id'])
         other = self.problem(self.service.ask('POST', '/v1/assessments', side(F=206.5), key), 422)
         self.assertEqual(other['type'], '/docs#problem-idempotency')
-        bad = self.service.ask('POST', '/v1/assessments', side(F=207.5), {'Idempotency-Key': 'x' * 256})
+        bad = self.service.ask(
+            'POST', '/v1/assessments', side(F=207.5), {'Idempotency-Key': 'x' * 256}
+        )
         self.problem(bad, 400)
 
     def test_a_form_is_answered_by_its_result_page(self):
-        form = urllib.parse.urlencode({**SIDE, 'F': 208.5, 'side': 'right', 'skin.mu': 100,
-                                       'subject': ''}).encode()
+        form = urllib.parse.urlencode(
+            {**SIDE, 'F': 208.5, 'side': 'right', 'skin.mu': 100, 'subject': ''}
+        ).encode()
         kind = {'Content-Type': 'application/x-www-form-urlencoded'}
         answer = self.service.ask('POST', '/v1/assessments', form, kind)
         self.assertEqual(answer.status, 303)
@@ -146,9 +174,15 @@ class Routes(unittest.TestCase):
         self.assertIn(('/R1', 'out_of_range'), self.errors(wrong))
 
     def test_a_browser_is_shown_its_faults_in_the_form(self):
-        answer = self.service.ask('POST', '/v1/assessments', b'R1=99&subject=%3Cb%3E', {
-            'Content-Type': 'application/x-www-form-urlencoded',
-            'Accept': 'text/html,application/xhtml+xml,*/*;q=0.8'})
+        answer = self.service.ask(
+            'POST',
+            '/v1/assessments',
+            b'R1=99&subject=%3Cb%3E',
+            {
+                'Content-Type': 'application/x-www-form-urlencoded',
+                'Accept': 'text/html,application/xhtml+xml,*/*;q=0.8',
+            },
+        )
         self.assertEqual((answer.status, answer.type), (422, 'text/html'))
         page = answer.body.decode()
         self.assertIn('R1 is 99 mm; accepted 3 to 15 mm', page)
@@ -178,8 +212,14 @@ class Routes(unittest.TestCase):
 
     def test_etags_spare_the_body(self):
         path = self.service.submit(F=210.5)['links']['self']
-        for where in (path, path + '/section.svg', path + '/field.vtu', '/v1/parameters',
-                      '/openapi.json', '/assets/plain.css'):
+        for where in (
+            path,
+            path + '/section.svg',
+            path + '/field.vtu',
+            '/v1/parameters',
+            '/openapi.json',
+            '/assets/plain.css',
+        ):
             first = self.service.get(where)
             self.assertEqual(first.status, 200, where)
             again = self.service.get(where, If_None_Match=first.headers['ETag'])
@@ -210,10 +250,12 @@ class Routes(unittest.TestCase):
             self.assertEqual(head.headers['Content-Length'], str(len(get.body)))
 
     def test_options_and_405_name_the_methods(self):
-        for path, allowed in (('/v1/assessments', 'GET, HEAD, POST, OPTIONS'),
-                              (ABSENT, 'GET, HEAD, DELETE, OPTIONS'),
-                              (ABSENT + '/cancel', 'POST, OPTIONS'),
-                              ('/healthz', 'GET, HEAD, OPTIONS')):
+        for path, allowed in (
+            ('/v1/assessments', 'GET, HEAD, POST, OPTIONS'),
+            (ABSENT, 'GET, HEAD, DELETE, OPTIONS'),
+            (ABSENT + '/cancel', 'POST, OPTIONS'),
+            ('/healthz', 'GET, HEAD, OPTIONS'),
+        ):
             answer = self.service.ask('OPTIONS', path)
             self.assertEqual((answer.status, answer.headers['Allow']), (204, allowed))
             answer = self.service.ask('PATCH', path)
@@ -234,8 +276,11 @@ class Routes(unittest.TestCase):
         seen = []
 
         def wait():
-            answer = self.service.ask('GET', document['links']['self'], headers={'Prefer': 'wait=20'})
+            answer = self.service.ask(
+                'GET', document['links']['self'], headers={'Prefer': 'wait=20'}
+            )
             seen.append(answer.json()['status'])
+
         threads = [threading.Thread(target=wait) for _ in range(50)]
         for thread in threads:
             thread.start()
@@ -313,7 +358,7 @@ class Routes(unittest.TestCase):
         path = self.service.submit(F=596, eM=42)['links']['self']
         events = self.stream(path)
         middle = len(events) // 2
-        self.assertEqual(self.stream(path, events[middle][0]), events[middle + 1:])
+        self.assertEqual(self.stream(path, events[middle][0]), events[middle + 1 :])
         self.assertIsNone(self.stream(path, events[-1][0]))
 
     def test_an_end_is_told_after_a_restart(self):
@@ -341,7 +386,9 @@ class Routes(unittest.TestCase):
             if not cursor:
                 break
         self.assertEqual(seen, made[::-1])
-        self.assertEqual(self.service.get('/v1/assessments?subject=L-1&side=right').json()['items'], [])
+        self.assertEqual(
+            self.service.get('/v1/assessments?subject=L-1&side=right').json()['items'], []
+        )
         done = self.service.get('/v1/assessments?subject=L-1&status=succeeded').json()['items']
         self.assertEqual(len(done), 5)
 
@@ -351,12 +398,25 @@ class Routes(unittest.TestCase):
         self.assertEqual(answer.type, 'text/csv')
         rows = list(csv.DictReader(io.StringIO(answer.body.decode())))
         self.assertEqual(len(rows), 1)
-        self.assertEqual((rows[0]['label'], rows[0]['F'], rows[0]['status'], rows[0]['eps_max']),
-                         ('"quoted", with comma', '310.5', 'succeeded', '1.2'))
+        self.assertEqual(
+            (rows[0]['label'], rows[0]['F'], rows[0]['status'], rows[0]['eps_max']),
+            ('"quoted", with comma', '310.5', 'succeeded', '1.2'),
+        )
 
     def test_a_wrong_query_is_400(self):
-        for query in ('limit=0', 'limit=501', 'limit=x', 'side=up', 'status=lost', 'subject=a%20b',
-                      'cursor=junk', 'limit=1&limit=2', 'page=2', 'subject=%zz', 'subject=%ff'):
+        for query in (
+            'limit=0',
+            'limit=501',
+            'limit=x',
+            'side=up',
+            'status=lost',
+            'subject=a%20b',
+            'cursor=junk',
+            'limit=1&limit=2',
+            'page=2',
+            'subject=%zz',
+            'subject=%ff',
+        ):
             self.problem(self.service.get('/v1/assessments?' + query), 400)
         for query in ('since=-1', 'since=x', 'limit=0', 'from=3'):
             self.problem(self.service.get('/v1/changes?' + query), 400)
@@ -367,8 +427,9 @@ class Routes(unittest.TestCase):
         self.service.ask('DELETE', path)
         page = self.service.get(f'/v1/changes?since={before}&limit=500').json()
         mine = [item for item in page['items'] if path.endswith(item['id'])]
-        self.assertEqual([item['change'] for item in mine],
-                         ['created', 'started', 'succeeded', 'erased'])
+        self.assertEqual(
+            [item['change'] for item in mine], ['created', 'started', 'succeeded', 'erased']
+        )
         numbers = [item['seq'] for item in page['items']]
         self.assertEqual(numbers, sorted(set(numbers)))
         self.assertEqual(page['last_seq'], numbers[-1])
@@ -384,13 +445,22 @@ class Routes(unittest.TestCase):
         self.assertIn(b'<VTKFile', vtu.body)
 
     def test_the_report_is_a_page_that_escapes(self):
-        path = self.service.submit(F=331.5, label='<script>x</script>', subject='R-1')['links']['self']
+        path = self.service.submit(F=331.5, label='<script>x</script>', subject='R-1')['links'][
+            'self'
+        ]
         answer = self.service.get(path + '/report')
         page = answer.body.decode()
         self.assertEqual(answer.type, 'text/html')
         self.assertNotIn('<script', page)
-        for text in ('&lt;script&gt;', 'R-1', 'Green\u2013Lagrange', 'engineering', 'section.svg',
-                     'animal', '331.5 N'):
+        for text in (
+            '&lt;script&gt;',
+            'R-1',
+            'Green\u2013Lagrange',
+            'engineering',
+            'section.svg',
+            'animal',
+            '331.5 N',
+        ):
             self.assertIn(text, page)
 
     def test_pages_need_nothing_from_elsewhere(self):
@@ -402,7 +472,9 @@ class Routes(unittest.TestCase):
             self.assertNotIn('unsafe', policy)
             page = answer.body.decode()
             self.assertEqual(re.findall(r'(?:src|href)="(?!/|#)[^"]*"', page), [], path)
-            self.assertEqual(re.findall(r'<script(?! src=)|<style|\son\w+=|style="', page), [], path)
+            self.assertEqual(
+                re.findall(r'<script(?! src=)|<style|\son\w+=|style="', page), [], path
+            )
             for name in re.findall(r'(?:src|href)="(/assets/[^"]*)"', page):
                 self.assertEqual(self.service.get(name).status, 200, name)
 
@@ -411,7 +483,9 @@ class Routes(unittest.TestCase):
         for parameter in self.service.get('/v1/parameters').json()['parameters']:
             accepted = parameter['accepted']
             self.assertIn(f'name="{parameter["key"]}"', page)
-            self.assertIn(f'({parameter["unit"]}, {accepted["min"]:g} to {accepted["max"]:g})', page)
+            self.assertIn(
+                f'({parameter["unit"]}, {accepted["min"]:g} to {accepted["max"]:g})', page
+            )
 
     def test_the_service_about_itself(self):
         self.assertEqual(self.service.get('/healthz').json(), {'status': 'alive'})
@@ -420,10 +494,13 @@ class Routes(unittest.TestCase):
         self.assertEqual(version['model'], {'name': 'macron2020-local', 'version': 1})
         self.assertTrue(version['libraries']['libmicrohttpd'])
         metrics = self.service.get('/metrics').body.decode()
-        for line in ('ischia_http_requests_total{route="GET /healthz",code="200"}',
-                     'ischia_solve_seconds_bucket{outcome="succeeded",le="+Inf"}',
-                     'ischia_queue_depth ', 'ischia_worker_deaths_total ',
-                     'ischia_store_seconds_count{kind="accept"}'):
+        for line in (
+            'ischia_http_requests_total{route="GET /healthz",code="200"}',
+            'ischia_solve_seconds_bucket{outcome="succeeded",le="+Inf"}',
+            'ischia_queue_depth ',
+            'ischia_worker_deaths_total ',
+            'ischia_store_seconds_count{kind="accept"}',
+        ):
             self.assertIn(line, metrics)
         for line in metrics.splitlines():
             self.assertRegex(line, r'^(# (HELP|TYPE) [a-z_]+ .+|[a-z_]+(\{.*\})? [-+0-9.eE]+)$')

@@ -28,6 +28,7 @@ static bool fails(void)
     return true;
 }
 
+/* NOLINTBEGIN(readability-inconsistent-declaration-parameter-name): glibc uses reserved names */
 void *malloc(size_t size)
 {
     void *memory = fails() ? NULL : __libc_malloc(size);
@@ -55,6 +56,8 @@ void free(void *memory)
     live -= memory != NULL;
     __libc_free(memory);
 }
+
+/* NOLINTEND(readability-inconsistent-declaration-parameter-name) */
 
 void failing_malloc_arm(long nth, bool and_all_after)
 {

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Fuzzes each target for a number of seconds (default 20) under libFuzzer, ASan and UBSan:
 #   tests/fuzz/run.sh [SECONDS] [TARGET]...
-# A sample that fails is left in build-fuzz/; keep it in tests/fuzz/corpus/TARGET/, where every build
-# replays it.
-set -eu
+# A sample that fails is left in build-fuzz/; keep it in tests/fuzz/corpus/TARGET/, where every
+# build replays it.
+set -euo pipefail
 cd "$(dirname "$0")/../.."
 seconds=${1:-20}
 [ $# -gt 0 ] && shift

@@ -44,8 +44,8 @@ PLANTED = {
         {"solver/case.c": SPDX + "\n".join(function_of(41, f"f{i}") for i in range(3))},
     "files_are_short":
         {"solver/case.c": SPDX + "\n".join(f"int v{i};\n" for i in range(400)) + "int w;\n"},
-    "lines_fit_in_100_columns":
-        {"docs/tool.py": "# SPDX-License-Identifier: GPL-3.0-or-later\n#" + "x" * 100 + "\n"},
+    "lines_are_not_too_wide":
+        {"docs/tool.py": "# SPDX-License-Identifier: GPL-3.0-or-later\n#" + "x" * 120 + "\n"},
     "control_flow_nests_shallowly":
         {"solver/case.c": SPDX + "int f(int a)\n{\n    while (a)\n        if (a)\n"
          "            for (;;)\n                if (a--) return 1;\n    return 0;\n}\n"},

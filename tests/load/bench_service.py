@@ -32,20 +32,30 @@ missed = []
 
 def mark(what, value, unit, limit, larger=True):
     good = value >= limit if larger else value <= limit
-    print(f'{"ok    " if good else "MISSED"} {what}: {value:,.1f} {unit}'
-          f' (mark: {"at least" if larger else "at most"} {limit:,})', flush=True)
+    print(
+        f'{"ok    " if good else "MISSED"} {what}: {value:,.1f} {unit}'
+        f' (mark: {"at least" if larger else "at most"} {limit:,})',
+        flush=True,
+    )
     if not good:
         missed.append(what)
 
 
 def wrk(url, *options):
-    text = subprocess.run(['wrk', '-t1', f'-d{SECONDS}', '--latency', *options, url], check=True,
-                          capture_output=True, text=True).stdout
+    text = subprocess.run(
+        ['wrk', '-t1', f'-d{SECONDS}', '--latency', *options, url],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
     number, unit = re.search(r'99%\s+([\d.]+)(us|ms|s)', text).groups()
     p99_ms = float(number) * {'us': 1e-3, 'ms': 1, 's': 1e3}[unit]
     errors = re.search(r'Non-2xx or 3xx responses: (\d+)', text)
-    return (float(re.search(r'Requests/sec:\s+([\d.]+)', text).group(1)), p99_ms,
-            int(errors.group(1)) if errors else 0)
+    return (
+        float(re.search(r'Requests/sec:\s+([\d.]+)', text).group(1)),
+        p99_ms,
+        int(errors.group(1)) if errors else 0,
+    )
 
 
 def resident_mib(service):
@@ -120,6 +130,7 @@ def slow_clients(service):
                 connection.close()
             except OSError:
                 pass
+
     threads = [threading.Thread(target=dawdle) for _ in range(200)]
     for thread in threads:
         thread.start()

@@ -96,9 +96,11 @@ static void long_rows_and_many_columns(void **state)
     static char text[3 * CSV_ROW_BYTES_MAX];
     (void)state;
     memset(text, 'x', sizeof text);
-    memcpy(text, "a\n", 2);
+    text[0] = 'a';
+    text[1] = '\n';
     text[2 * CSV_ROW_BYTES_MAX + 100] = '\n';
-    memcpy(text + sizeof text - 3, "\nb\n", 3);
+    text[sizeof text - 3] = text[sizeof text - 1] = '\n';
+    text[sizeof text - 2] = 'b';
     open_bytes(text, sizeof text);
     assert_string_equal(next(), "ok@1: a");
     assert_string_equal(next(), "limit@2: ");

@@ -89,11 +89,11 @@ static void accept_chooses(void **state)
     (void)state;
     static const char *const types[] = {"application/json", "text/csv", NULL};
     assert_int_equal(query_accept(NULL, types), 0);
-    assert_int_equal(query_accept("*/*", types), 0);
+    assert_int_equal(query_accept("*\x2f*", types), 0);
     assert_int_equal(query_accept("text/csv", types), 1);
     assert_int_equal(query_accept("text/*", types), 1);
     assert_int_equal(query_accept("application/json;q=0.5, text/csv;q=0.9", types), 1);
-    assert_int_equal(query_accept("application/json;q=0, */*", types), 1);
+    assert_int_equal(query_accept("application/json;q=0, *\x2f*", types), 1);
     assert_int_equal(query_accept("image/png", types), -1);
     assert_int_equal(query_accept("", types), -1);
     assert_true(query_media_type_is("application/json; charset=utf-8", "application/json"));

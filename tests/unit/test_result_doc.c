@@ -110,7 +110,7 @@ static void nonsense_is_not_written(void **state)
     assert_null(text);
 }
 
-/* Every member cut out, and every value replaced by one of another kind: an error, never a result. */
+/* Every member cut out, every value replaced by one of another kind: an error, never a result. */
 static void replaced(const char *text, const char *from, const char *to, char *ret, size_t size)
 {
     const char *at = strstr(text, from);

@@ -6,13 +6,16 @@
  * The whole bulk modulus acts at the points (kappa_point = kappa), which makes the element the
  * plain fully integrated hexahedron that other codes have. The approach d is prescribed.
  *
- * usage: solve_body PROBLEM
+ * usage: solve_body PROBLEM [DECK]   DECK: also write the problem as an input deck for CalculiX
  * Lines: material TISSUE MU KAPPA | friction F | node X Y Z FLAGS UX UY UZ | hex TISSUE N0 ... N7 |
  *        approach D | force F (of the model as meshed, N) | det_F_min J
  */
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "solver/inp.h"
+#include "solver/ogden.h"
 #include "solver/units.h"
 #include "tests/verification/bodies.h"
 
@@ -26,6 +29,7 @@ struct problem {
     double friction;
     double d_mm;
     int steps;
+    double contact_stiffness_MPa_mm, stick_slope_MPa_mm; /* CalculiX's; 0: the exporter's own */
 };
 
 static const struct problem problems[] = {
@@ -60,7 +64,9 @@ static const struct problem problems[] = {
      .bulk_ratio = 15,
      .friction = 0.4,
      .d_mm = 10,
-     .steps = 40},
+     .steps = 40,
+     .contact_stiffness_MPa_mm = 1,
+     .stick_slope_MPa_mm = 0.5},
 };
 
 static const struct problem *find_problem(const char *name)
@@ -127,20 +133,44 @@ static enum ischia_code bench_run(struct bench *b, const struct problem *p,
     return ISCHIA_OK;
 }
 
+/* The exporter knows the plate as a bone that slides. */
+static enum ischia_code write_deck(const char *path, const struct problem *p, struct bench *b,
+                                   struct ischia_error *err)
+{
+    struct inp_model model = {.alpha = OGDEN_ALPHA,
+                              .friction = p->friction,
+                              .bone_slides = p->top_flags & NODE_ON_PLATE,
+                              .contact_stiffness_MPa_mm = p->contact_stiffness_MPa_mm,
+                              .stick_slope_MPa_mm = p->stick_slope_MPa_mm,
+                              .drive = INP_DISPLACEMENT_MM,
+                              .drive_value = p->d_mm,
+                              .title = p->name};
+    for (int t = 0; t < TISSUE_COUNT; t++)
+        model.tissue[t] =
+            (struct inp_tissue){b->body.material[t].mu_MPa, b->body.material[t].kappa_MPa};
+    for (int n = 0; n < b->mesh.node_count; n++)
+        if (b->mesh.node_flags[n] & NODE_ON_PLATE) b->mesh.node_flags[n] |= NODE_ON_BONE;
+    FILE *out = fopen(path, "w");
+    CHECK(out != NULL, err, ISCHIA_E_IO, "cannot write %s: %s", path, strerror(errno));
+    const enum ischia_code code = inp_write(out, &b->mesh, &model, err);
+    if (fclose(out) != 0 && code == ISCHIA_OK)
+        return FAIL(err, ISCHIA_E_IO, "cannot write %s: %s", path, strerror(errno));
+    return code;
+}
+
 int main(int argc, char **argv)
 {
     struct ischia_error err;
     struct bench bench = {0};
-    const struct problem *p = argc == 2 ? find_problem(argv[1]) : NULL;
+    const struct problem *p = argc == 2 || argc == 3 ? find_problem(argv[1]) : NULL;
     if (p == NULL) {
-        fprintf(stderr, "usage: solve_body PROBLEM\n");
+        fprintf(stderr, "usage: solve_body PROBLEM [DECK]\n");
         return 2;
     }
-    const enum ischia_code code = bench_run(&bench, p, &err);
-    if (code == ISCHIA_OK)
-        print_solution(&bench.mesh, &bench.body, p, &bench.state);
-    else
-        fprintf(stderr, "%s\n", err.message);
+    enum ischia_code code = bench_run(&bench, p, &err);
+    if (code == ISCHIA_OK) print_solution(&bench.mesh, &bench.body, p, &bench.state);
+    if (code == ISCHIA_OK && argc == 3) code = write_deck(argv[2], p, &bench, &err);
+    if (code != ISCHIA_OK) fprintf(stderr, "%s\n", err.message);
     bench_finish(&bench);
     return code == ISCHIA_OK ? 0 : 1;
 }

@@ -37,7 +37,8 @@ static void nominal_stress(const double F[3][3], double ret[3][3])
             u[n][i] = -cube[n][i];
             for (int j = 0; j < 3; j++) u[n][i] += F[i][j] * cube[n][j];
         }
-    assert_true(element_energy(&reference, &soft, u, NULL, &derivatives) < HUGE_VAL);
+    assert_true(element_energy(&reference, &soft, (const double(*)[3])u, NULL, &derivatives) <
+                HUGE_VAL);
     memset(ret, 0, 9 * sizeof **ret);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
