@@ -5,7 +5,7 @@
 // Run it when the model's version changes; a side that does not converge is left out.
 import { execFileSync } from 'node:child_process';
 import { mkdir, mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
-import { tmpdir } from 'node:os';
+import { availableParallelism, tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
@@ -27,7 +27,9 @@ async function cohort() {
   const folder = await mkdtemp(join(tmpdir(), 'ischia-reference-'));
   try {
     const csv = join(folder, 'cohort.csv');
-    execFileSync(ischia, ['cohort', input, '-o', csv], { stdio: ['ignore', 'inherit', 'inherit'] });
+    execFileSync(ischia, ['cohort', input, '-j', String(availableParallelism()), '-o', csv], {
+      stdio: ['ignore', 'inherit', 'inherit'],
+    });
     return rows_of(await readFile(csv, 'utf8'));
   } finally {
     await rm(folder, { recursive: true });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The page against ischiad itself, which solves: ISCHIAD and ISCHIA name the two programs. The
-// solves are coarse ones, so that the file takes seconds; what is shown must be what was computed.
+// solves are coarse ones but for the one that is cancelled, so that the file takes seconds; what is shown must be what was computed.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { after, afterEach, before, beforeEach, test } from 'node:test';
@@ -40,11 +40,11 @@ const document_of = (id) =>
 
 /* Sends a person of Table 2 and resolves to the ids of the two sides. The daemon answers at once
  * what it has solved before: `force` makes the numbers new. */
-async function submit_sample(force) {
+async function submit_sample(force, resolution = 'coarse') {
   await open_form(page, origin);
   await page.getByRole('button', { name: 'Fill in' }).click();
   if (force) for (const side of ['left', 'right']) await page.fill(`#${side}-F`, force);
-  await page.selectOption('.submit select', 'coarse');
+  await page.selectOption('.submit select', resolution);
   await page.click('button[type=submit]');
   await page.waitForURL('**/assessments/**');
   const url = new URL(page.url());
@@ -98,7 +98,7 @@ test('the 3-D view and the section draw the field of the daemon', async () => {
 });
 
 test('cancel stops a solve', async () => {
-  const ids = await submit_sample('201,5');
+  const ids = await submit_sample('201,5', 'fine'); /* long enough to be caught */
   for (const button of await page.getByRole('button', { name: 'Cancel' }).all())
     await button.click();
   await all_ended(2);
