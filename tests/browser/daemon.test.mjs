@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The page against ischiad itself, which solves: ISCHIAD and ISCHIA name the two programs. The
-// solves are coarse ones but for the one that is cancelled, so that the file takes seconds; what is shown must be what was computed.
+// solves are coarse ones, but for the one that is cancelled, so that the file takes seconds; what is
+// shown must be what was computed.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { after, afterEach, before, beforeEach, test } from 'node:test';
@@ -99,8 +100,11 @@ test('the 3-D view and the section draw the field of the daemon', async () => {
 
 test('cancel stops a solve', async () => {
   const ids = await submit_sample('201,5', 'fine'); /* long enough to be caught */
-  for (const button of await page.getByRole('button', { name: 'Cancel' }).all())
-    await button.click();
+  const card = (name) => page.getByRole('region', { name, exact: true });
+  for (const side of ['Left', 'Right']) {
+    await card(side).getByRole('button', { name: 'Cancel' }).click();
+    await card(side).locator('.no-result').waitFor();
+  }
   await all_ended(2);
   for (const id of ids) assert.equal((await document_of(id)).status, 'cancelled');
   assert.match(await page.locator('.no-result').first().innerText(), /Cancelled/);
