@@ -173,7 +173,8 @@ void guard_headers(const struct call *call, struct http_response *response)
     http_header_static(response, "Content-Security-Policy", policy_of(response->type));
     http_header_static(response, "X-Content-Type-Options", "nosniff");
     http_header_static(response, "X-Frame-Options", "DENY");
-    http_header_static(response, "Referrer-Policy", "no-referrer");
+    /* Not no-referrer: under it a browser sends a plain form's Origin as null, which is refused. */
+    http_header_static(response, "Referrer-Policy", "same-origin");
     http_header_static(response, "Cross-Origin-Resource-Policy", "same-origin");
     http_header_static(response, "Cross-Origin-Opener-Policy", "same-origin");
     http_header_static(response, "Permissions-Policy", "camera=(), geolocation=(), microphone=()");

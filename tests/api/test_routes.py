@@ -510,7 +510,7 @@ class Routes(unittest.TestCase):
             headers = self.service.get(path).headers
             self.assertEqual(headers['X-Content-Type-Options'], 'nosniff')
             self.assertEqual(headers['X-Frame-Options'], 'DENY')
-            self.assertEqual(headers['Referrer-Policy'], 'no-referrer')
+            self.assertEqual(headers['Referrer-Policy'], 'same-origin')
             self.assertTrue(headers['Content-Security-Policy'])
 
 
