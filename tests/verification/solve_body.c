@@ -164,13 +164,13 @@ int main(int argc, char **argv)
     struct bench bench = {0};
     const struct problem *p = argc == 2 || argc == 3 ? find_problem(argv[1]) : NULL;
     if (p == NULL) {
-        fprintf(stderr, "usage: solve_body PROBLEM [DECK]\n");
+        (void)fprintf(stderr, "usage: solve_body PROBLEM [DECK]\n");
         return 2;
     }
     enum ischia_code code = bench_run(&bench, p, &err);
     if (code == ISCHIA_OK) print_solution(&bench.mesh, &bench.body, p, &bench.state);
     if (code == ISCHIA_OK && argc == 3) code = write_deck(argv[2], p, &bench, &err);
-    if (code != ISCHIA_OK) fprintf(stderr, "%s\n", err.message);
+    if (code != ISCHIA_OK) (void)fprintf(stderr, "%s\n", err.message);
     bench_finish(&bench);
     return code == ISCHIA_OK ? 0 : 1;
 }

@@ -67,19 +67,20 @@ static void check_stretch(double l1, double l2, double l3)
 static void uniaxial(void **state)
 {
     (void)state;
-    for (double l = 0.3; l < 3.1; l += 0.1) check_stretch(l, 1 / sqrt(l), 1 / sqrt(l));
+    for (int i = 3; i <= 30; i++) check_stretch(0.1 * i, 1 / sqrt(0.1 * i), 1 / sqrt(0.1 * i));
 }
 
 static void equibiaxial(void **state)
 {
     (void)state;
-    for (double l = 0.5; l < 2.1; l += 0.1) check_stretch(l, l, 1 / (l * l));
+    for (int i = 5; i <= 20; i++) check_stretch(0.1 * i, 0.1 * i, 100.0 / (i * i));
 }
 
 static void simple_shear(void **state)
 {
     (void)state;
-    for (double gamma = -3; gamma < 3.05; gamma += 0.25) {
+    for (int step = -12; step <= 12; step++) {
+        const double gamma = 0.25 * step;
         const double F[3][3] = {{1, gamma, 0}, {0, 1, 0}, {0, 0, 1}};
         const double l = gamma / 2 + sqrt(1 + gamma * gamma / 4);
         double P[3][3];
@@ -93,7 +94,8 @@ static void simple_shear(void **state)
 static void dilatation(void **state)
 {
     (void)state;
-    for (double l = 0.9; l < 1.11; l += 0.05) {
+    for (int step = -2; step <= 2; step++) {
+        const double l = 1 + 0.05 * step;
         const double F[3][3] = {{l, 0, 0}, {0, l, 0}, {0, 0, l}};
         double P[3][3];
         nominal_stress(F, P);

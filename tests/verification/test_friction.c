@@ -71,7 +71,8 @@ static void a_slipping_node_carries_mu_N_against_its_slip(void **state)
     (void)state;
     struct rig r;
     rig_init(&r, 0.3);
-    for (double angle = 0; angle < 6; angle += 0.7) {
+    for (int i = 0; i < 9; i++) {
+        const double angle = 0.7 * i;
         double f[8][3];
         r.u[0][0] = 5 * cos(angle);
         r.u[0][1] = 5 * sin(angle);
