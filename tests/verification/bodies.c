@@ -49,6 +49,8 @@ enum ischia_code block_init(struct mesh *ret, const double size_mm[3], const int
     struct mesh mesh = {.node_count = (m[0] + 1) * (m[1] + 1) * (m[2] + 1),
                         .element_count = m[0] * m[1] * m[2],
                         .muscle_count = m[0] * m[1] * m[2],
+                        .tip_z_mm = size_mm[2],
+                        .top_z_mm = size_mm[2],
                         .seat_quad_count = m[0] * m[1],
                         .outer_skin_quad_count = m[0] * m[1]};
     mesh.X_mm = calloc((size_t)mesh.node_count, sizeof *mesh.X_mm);
@@ -80,12 +82,15 @@ enum ischia_code bench_init(struct bench *b, const struct element_material mater
         b->seat.stick_stiffness_N_mm[n] *= stick_stiffening;
     TRY(newton_create(&b->newton, &b->body, &b->assembly, &b->seat, err));
     b->state.u_mm = calloc((size_t)b->mesh.node_count, sizeof *b->state.u_mm);
-    CHECK(b->state.u_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the state");
+    b->normal_before_N = calloc((size_t)b->mesh.node_count, sizeof *b->normal_before_N);
+    CHECK(b->state.u_mm != NULL && b->normal_before_N != NULL, err, ISCHIA_E_MEMORY,
+          "not enough memory for the state");
     return ISCHIA_OK;
 }
 
 void bench_finish(struct bench *b)
 {
+    free(b->normal_before_N);
     free(b->state.u_mm);
     newton_destroy(b->newton);
     seat_finish(&b->seat);
@@ -109,7 +114,11 @@ enum ischia_code bench_press(struct bench *b, double d_mm, struct ischia_error *
 
 double bench_end_step(struct bench *b)
 {
-    return seat_advance(&b->seat, (const double(*)[3])b->state.u_mm);
+    const double dissipated =
+        seat_advance(&b->seat, (const double(*)[3])b->state.u_mm, b->normal_before_N);
+    memcpy(b->normal_before_N, b->seat.normal_N,
+           sizeof *b->normal_before_N * (size_t)b->mesh.node_count);
+    return dissipated;
 }
 
 /* Adds the solution of one Newton step to the state; its right-hand side is given. */

@@ -20,6 +20,7 @@ struct bench {
     struct seat seat;
     struct newton *newton;
     struct equilibrium state;
+    double *normal_before_N; /* [node] contact forces at the end of the last step */
 };
 
 /* Fills a zeroed bench whose mesh is already there, one material for each tissue. On error call
