@@ -8,7 +8,7 @@
 /* Stiffness of the sticking springs by unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
 static const double stick_stiffness_MPa_mm = 0.25;
 
-/* The outer skin starts resting on the seat: pressed by a force too small to matter, but not zero. */
+/* The outer skin starts resting on the seat: pressed by a force too small to matter, not zero. */
 static const double resting_N = 1e-12;
 
 static double quad_area_mm2(const struct mesh *mesh, const int quad[4])

@@ -71,8 +71,8 @@ bool seat_slip_direction(const struct seat *seat, const double (*u_mm)[3], int n
 
 /*
  * Ends a load step: anchors of slipping nodes follow, those of nodes off the seat move along.
- * Returns the energy dissipated by the slip, N mm: mu times slip times the mean of the contact force
- * before (normal_before_N[node]) and after the step, which is of second order in the step.
+ * Returns the energy dissipated by the slip, N mm: mu times slip times the mean of the contact
+ * forces before (normal_before_N[node]) and after the step, which is of second order in the step.
  */
 double seat_advance(struct seat *seat, const double (*u_mm)[3], const double *normal_before_N);
 

@@ -18,6 +18,6 @@ int command_check_tangent(int argc, char **argv)
     const enum cli_parse parsed = cli_parse_options(&usage, argc, argv, NULL);
     if (parsed != CLI_RUN) return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
     if (ischia_check_tangents(stdout, &err) != ISCHIA_OK)
-        return report_error("check-tangent", &err);
+        return (int)report_error("check-tangent", &err);
     return EXIT_DONE;
 }

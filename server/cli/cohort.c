@@ -323,5 +323,5 @@ int command_cohort(int argc, char **argv)
     if (!cli_whole_number(&usage, "--jobs", jobs_text, 1, CREW_MEMBERS_MAX, &jobs))
         return EXIT_BAD_INPUT;
     if (!defaults_are_known(&defaults)) return EXIT_BAD_INPUT;
-    return run_file(path, output, jobs, &defaults);
+    return (int)run_file(path, output, jobs, &defaults);
 }
