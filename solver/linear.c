@@ -35,7 +35,8 @@ static void common_init(cholmod_common *common)
 /*
  * The analysis with METIS' ordering. METIS is called apart from it, because CHOLMOD ignores METIS'
  * failures: without memory it would go on with whatever the permutation held. It is filled with
- * what is no permutation instead, and must be one afterwards.
+ * what is no permutation instead, and must be one afterwards. Nor may the analysis take up another
+ * ordering when memory fails it: the solution's last bits would differ.
  */
 static void analyse(struct linear *l)
 {
@@ -45,11 +46,11 @@ static void analyse(struct linear *l)
     common->status = CHOLMOD_OUT_OF_MEMORY;
     if (order == NULL) return;
     memset(order, 0xff, n * sizeof *order);
-    const bool ordered = cholmod_metis(l->A, NULL, 0, 0, order, common) &&
-                         cholmod_check_perm(order, n, n, common);
-    if (ordered)
-        l->L = cholmod_analyze_p(l->A, order, NULL, 0, common);
-    else if (common->status == CHOLMOD_OK || common->status == CHOLMOD_INVALID)
+    const bool ordered =
+        cholmod_metis(l->A, NULL, 0, 0, order, common) && cholmod_check_perm(order, n, n, common);
+    if (ordered) l->L = cholmod_analyze_p(l->A, order, NULL, 0, common);
+    const bool kept = l->L != NULL && l->L->ordering == CHOLMOD_GIVEN;
+    if (!kept && (common->status == CHOLMOD_OK || common->status == CHOLMOD_INVALID))
         common->status = CHOLMOD_OUT_OF_MEMORY;
     free(order);
 }
@@ -128,9 +129,21 @@ enum ischia_code linear_factor(struct linear *l, const unsigned char *keep,
     return ISCHIA_OK;
 }
 
+/* Makes what cholmod_solve2 works with, because it does not notice when it cannot. */
+static bool reserve_solution(struct linear *l, size_t count)
+{
+    const size_t n = l->A->nrow;
+    cholmod_common *c = &l->common;
+    return cholmod_ensure_dense(&l->solution, n, count, n, CHOLMOD_REAL, c) != NULL &&
+           cholmod_ensure_dense(&l->work_y, n, count, n, CHOLMOD_REAL, c) != NULL &&
+           cholmod_ensure_dense(&l->work_e, count, l->L->maxesize, count, CHOLMOD_REAL, c) != NULL;
+}
+
 enum ischia_code linear_solve(struct linear *l, int count, double *x, struct ischia_error *err)
 {
     const size_t n = l->A->nrow;
+    CHECK(reserve_solution(l, (size_t)count), err, ISCHIA_E_MEMORY,
+          "not enough memory to solve %zu equations", n);
     cholmod_dense b = {.nrow = n,
                        .ncol = (size_t)count,
                        .nzmax = n * (size_t)count,
