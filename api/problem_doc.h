@@ -20,12 +20,14 @@ enum problem_kind {
     PROBLEM_NOT_FOUND,         /* 404                                                    */
     PROBLEM_METHOD,            /* 405                                                    */
     PROBLEM_NOT_ACCEPTABLE,    /* 406                                                    */
+    PROBLEM_TIMEOUT,           /* 408 the request did not arrive in time                 */
     PROBLEM_CONFLICT,          /* 409 not in the present state                           */
     PROBLEM_TOO_LARGE,         /* 413                                                    */
     PROBLEM_MEDIA_TYPE_WRONG,  /* 415                                                    */
     PROBLEM_INVALID,           /* 422 the document says something wrong: see errors      */
     PROBLEM_IDEMPOTENCY,       /* 422 the key was used with another body                 */
     PROBLEM_QUEUE_FULL,        /* 429                                                    */
+    PROBLEM_RATE,              /* 429 this client asks too often                         */
     PROBLEM_HEADERS_TOO_LARGE, /* 431                                                    */
     PROBLEM_INTERNAL,          /* 500                                                    */
     PROBLEM_UNAVAILABLE,       /* 503 shutting down, or the store cannot be written      */

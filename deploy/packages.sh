@@ -10,10 +10,12 @@ packages_of() {
   done
 }
 
-# packages_missing NAME...: those that dpkg does not know as installed, one a line.
+# packages_missing NAME...: those that dpkg does not know as installed, one a line. A nodejs
+# that is not Debian's brings its own npm and conflicts with the package.
 packages_missing() {
   local name
   for name in "$@"; do
+    [[ $name != npm ]] || ! command -v npm >/dev/null || continue
     [[ $(dpkg-query -W -f '${db:Status-Status}' "$name" 2>/dev/null) == installed ]] || echo "$name"
   done
 }

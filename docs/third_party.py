@@ -17,6 +17,10 @@ Everything that Ischia is built from, linked with or tested by, as packages of D
 `/usr/share/doc/PACKAGE/copyright` has the full text). Written by `docs/third_party.py` from
 `deploy/packages.txt`; do not edit. All of it is compatible with GPL-3.0-or-later
 (`docs/decisions/0001-licence-gpl3.md`); tools are run, not linked.
+
+The clinic page is bundled from npm packages: `static/package-lock.json` names them and their
+versions, and the built `assets/licences.txt`, which the daemon serves, has the full licence text of
+each that is in a bundle.
 """
 TITLES = {"build": "To build and to run", "test": "To test", "all": "To test everything"}
 

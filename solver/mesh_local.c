@@ -31,6 +31,11 @@ const struct mesh_divisions mesh_divisions[ISCHIA_RESOLUTION_COUNT] = {
     [ISCHIA_FINE] = {.across = 12, .around = 6, .radial = 12, .fat = 6, .skin = 1},
 };
 
+const struct mesh_divisions mesh_companions[ISCHIA_RESOLUTION_COUNT] = {
+    [ISCHIA_STANDARD] = {.across = 6, .around = 3, .radial = 6, .fat = 3, .skin = 1},
+    [ISCHIA_FINE] = {.across = 8, .around = 4, .radial = 8, .fat = 4, .skin = 1},
+};
+
 /* How far the core patch reaches over the quarter disc: along its axes, and at its corner. */
 static const double core_axis_fraction = 0.55;
 static const double core_corner_fraction = 0.46;

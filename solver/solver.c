@@ -22,13 +22,17 @@ static const double kappa_point_over_mu = 5;
 /* What a result must pass to be called converged. */
 static const double energy_residual_max = 5e-3;
 
-/* Allowance of the error estimate beside half the bracket [raw, recovered]: friction history and
- * what the bracket does not see, over eps_max. */
+/* What the error estimate allows for beside the two levels of resolution, over eps_max: friction
+ * history, regularisation, and orders that are not quite two. */
 static const double error_allowance = 0.005;
+/* Of the extrapolation's own correction, how much may be wrong. */
+static const double correction_doubt = 0.25;
+
+enum { LEVEL_COMPANION, LEVEL_MAIN, LEVEL_COUNT };
 
 struct ischia_solver {
-    struct assembly assembly[ISCHIA_RESOLUTION_COUNT]; /* made when first needed */
-    bool has_assembly[ISCHIA_RESOLUTION_COUNT];
+    struct assembly assembly[ISCHIA_RESOLUTION_COUNT][LEVEL_COUNT]; /* made when first needed */
+    bool has_assembly[ISCHIA_RESOLUTION_COUNT][LEVEL_COUNT];
 };
 
 enum ischia_code ischia_solver_create(struct ischia_solver **ret_solver, struct ischia_error *err)
@@ -43,7 +47,8 @@ void ischia_solver_destroy(struct ischia_solver *solver)
 {
     if (solver == NULL) return;
     for (int r = 0; r < ISCHIA_RESOLUTION_COUNT; r++)
-        if (solver->has_assembly[r]) assembly_finish(&solver->assembly[r]);
+        for (int l = 0; l < LEVEL_COUNT; l++)
+            if (solver->has_assembly[r][l]) assembly_finish(&solver->assembly[r][l]);
     free(solver);
 }
 
@@ -56,24 +61,35 @@ void ischia_field_finish(struct ischia_field *field)
 
 /* --- one solve -------------------------------------------------------------------------------- */
 
-struct solve {
-    const struct ischia_case *c;
-    const struct ischia_observer *observer;
+/* The case on one mesh. */
+struct level {
     struct mesh mesh;
     struct body body;
     struct seat seat;
     struct equilibrium state;
     struct assembly *assembly; /* the solver's */
+    struct path_report report;
+    struct ischia_load_point load_curve[ISCHIA_LOAD_POINTS_MAX];
+    int load_curve_count;
+};
+
+struct solve {
+    const struct ischia_case *c;
+    const struct ischia_observer *observer;
+    struct level level[LEVEL_COUNT];
+    int current; /* the level being solved                   */
     struct ischia_result result;
-    double fraction; /* of the progress last reported */
+    double fraction; /* of the progress last reported         */
 };
 
 static void solve_finish(struct solve *s)
 {
-    free(s->state.u_mm);
-    seat_finish(&s->seat);
-    body_finish(&s->body);
-    mesh_finish(&s->mesh);
+    for (int l = 0; l < LEVEL_COUNT; l++) {
+        free(s->level[l].state.u_mm);
+        seat_finish(&s->level[l].seat);
+        body_finish(&s->level[l].body);
+        mesh_finish(&s->level[l].mesh);
+    }
 }
 
 static void set_materials(const struct ischia_case *c, struct element_material ret[TISSUE_COUNT])
@@ -89,36 +105,48 @@ static void set_materials(const struct ischia_case *c, struct element_material r
     }
 }
 
-static enum ischia_code solve_init(struct solve *s, struct ischia_solver *solver,
+static enum ischia_code level_init(struct solve *s, int l, struct ischia_solver *solver,
                                    struct ischia_error *err)
 {
-    struct element_material material[TISSUE_COUNT];
     const int r = (int)s->c->resolution;
-    TRY(mesh_local_init(&s->mesh, s->c, &mesh_divisions[r], err));
-    if (!solver->has_assembly[r]) TRY(assembly_init(&solver->assembly[r], &s->mesh, err));
-    solver->has_assembly[r] = true;
-    s->assembly = &solver->assembly[r];
+    struct level *level = &s->level[l];
+    struct element_material material[TISSUE_COUNT];
+    TRY(mesh_local_init(&level->mesh, s->c,
+                        l == LEVEL_MAIN ? &mesh_divisions[r] : &mesh_companions[r], err));
+    if (!solver->has_assembly[r][l]) TRY(assembly_init(&solver->assembly[r][l], &level->mesh, err));
+    solver->has_assembly[r][l] = true;
+    level->assembly = &solver->assembly[r][l];
     set_materials(s->c, material);
-    TRY(body_init(&s->body, &s->mesh, material, err));
-    TRY(seat_init(&s->seat, &s->mesh, s->c->option[ISCHIA_FRICTION], err));
-    s->state.u_mm = calloc((size_t)s->mesh.node_count, sizeof *s->state.u_mm);
-    CHECK(s->state.u_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the displacements");
+    TRY(body_init(&level->body, &level->mesh, material, err));
+    TRY(seat_init(&level->seat, &level->mesh, s->c->option[ISCHIA_FRICTION], err));
+    level->state.u_mm = calloc((size_t)level->mesh.node_count, sizeof *level->state.u_mm);
+    CHECK(level->state.u_mm != NULL, err, ISCHIA_E_MEMORY,
+          "not enough memory for the displacements");
     return ISCHIA_OK;
 }
+
+/* Share of the work that the companion mesh takes. */
+static const double companion_share = 0.3;
 
 static bool report_iteration(void *context, int load_step, int newton_iteration, double force_N)
 {
     struct solve *s = context;
     const double F_N = side_force_N(force_N);
+    const bool companion = s->current == LEVEL_COMPANION;
     /* The force is what a user waits for; early steps carry little of it, hence the root. */
     const double share = sqrt(fmax(0, fmin(1, F_N / s->c->param[ISCHIA_F])));
+    const double start =
+        companion || s->level[LEVEL_COMPANION].mesh.node_count == 0 ? 0 : companion_share;
     if (s->observer == NULL || s->observer->on_progress == NULL) return true;
-    s->fraction = fmax(s->fraction, 0.99 * share);
+    s->fraction =
+        fmax(s->fraction, companion ? companion_share * share : start + (0.99 - start) * share);
     const struct ischia_progress progress = {.fraction = s->fraction,
                                              .load_step = load_step,
                                              .newton_iteration = newton_iteration,
                                              .F_N = F_N,
-                                             .message = "pressing the tissue on the seat"};
+                                             .message =
+                                                 companion ? "pressing the coarser mesh on the seat"
+                                                           : "pressing the tissue on the seat"};
     return s->observer->on_progress(s->observer->context, &progress);
 }
 
@@ -132,20 +160,58 @@ static enum ischia_code record_step(void *context, const struct equilibrium *sta
                                     struct ischia_error *err)
 {
     struct solve *s = context;
-    struct ischia_result *r = &s->result;
+    struct level *level = &s->level[s->current];
     struct strain_field field;
-    if (r->load_curve_count == ISCHIA_LOAD_POINTS_MAX) return ISCHIA_OK;
-    const struct axis_strain axis = axis_strain_of(&s->mesh, (const double(*)[3])state->u_mm);
-    TRY(strain_field_init(&field, &s->mesh, &state->u_mm[0][0], err));
-    const struct strain_measures most = strain_muscle_maxima(&s->mesh, &field);
+    if (level->load_curve_count == ISCHIA_LOAD_POINTS_MAX) return ISCHIA_OK;
+    const struct axis_strain axis = axis_strain_of(&level->mesh, (const double(*)[3])state->u_mm);
+    TRY(strain_field_init(&field, &level->mesh, &state->u_mm[0][0], err));
+    const struct strain_measures most = strain_muscle_maxima(&level->mesh, &field);
     strain_field_finish(&field);
-    r->load_curve[r->load_curve_count++] =
+    level->load_curve[level->load_curve_count++] =
         (struct ischia_load_point){.F_N = side_force_N(state->force_N),
                                    .displacement_mm = state->d_mm,
                                    .eps_max = eps_max_of(&axis),
                                    .E_shear_max = most.green_lagrange_shear,
                                    .E_comp_max = most.green_lagrange_compression};
     return ISCHIA_OK;
+}
+
+/* eps_max of a level's load curve at a force, linear between its points and from rest. */
+static double eps_max_at(const struct level *level, double F_N)
+{
+    struct ischia_load_point before = {0};
+    for (int i = 0; i < level->load_curve_count; i++) {
+        const struct ischia_load_point *p = &level->load_curve[i];
+        if (F_N <= p->F_N && p->F_N > before.F_N)
+            return before.eps_max +
+                   (p->eps_max - before.eps_max) * (F_N - before.F_N) / (p->F_N - before.F_N);
+        before = *p;
+    }
+    return before.eps_max;
+}
+
+/*
+ * Takes the main level's load curve as the result's, eps_max extrapolated to ever finer meshes: its
+ * error falls with the square of the mesh size (docs/VERIFICATION.md), so with r the ratio of the
+ * two sizes, eps = eps_main + (eps_main - eps_companion) / (r^2 - 1) (Richardson). Returns the
+ * correction at the end of the path; 0 where there is no companion.
+ */
+static double extrapolate(struct solve *s)
+{
+    const struct level *companion = &s->level[LEVEL_COMPANION], *level = &s->level[LEVEL_MAIN];
+    const double ratio =
+        (double)level->mesh.divisions.across / fmax(1, companion->mesh.divisions.across);
+    const bool possible = companion->report.reason > 0;
+    double correction = 0;
+    s->result.load_curve_count = level->load_curve_count;
+    for (int i = 0; i < level->load_curve_count; i++) {
+        struct ischia_load_point *p = &s->result.load_curve[i];
+        *p = level->load_curve[i];
+        if (possible)
+            correction = (p->eps_max - eps_max_at(companion, p->F_N)) / (ratio * ratio - 1);
+        p->eps_max += correction;
+    }
+    return correction;
 }
 
 /* Force at which a measure of the load curve first crosses its threshold, linear between steps. */
@@ -163,37 +229,52 @@ static double crossing_N(const struct ischia_result *r, size_t offset, double th
     return (double)NAN;
 }
 
+static void measure_axis(struct solve *s)
+{
+    struct ischia_result *r = &s->result;
+    const struct level *level = &s->level[LEVEL_MAIN];
+    const struct axis_strain axis =
+        axis_strain_of(&level->mesh, (const double(*)[3])level->state.u_mm);
+    const double correction = extrapolate(s);
+    const double bracket = fabs(axis.recovered - axis.raw);
+    r->strain.eps_max = eps_max_of(&axis) + correction;
+    r->strain.eps_max_depth_mm = axis.depth_mm;
+    /* Without a second level the whole bracket stands for the error of its middle. */
+    r->numerics.eps_max_error =
+        (s->level[LEVEL_COMPANION].report.reason > 0 ? correction_doubt * fabs(correction)
+                                                     : bracket) +
+        error_allowance * r->strain.eps_max;
+}
+
 static enum ischia_code measure(struct solve *s, struct ischia_error *err)
 {
     struct ischia_result *r = &s->result;
-    const struct axis_strain axis = axis_strain_of(&s->mesh, (const double(*)[3])s->state.u_mm);
-    const struct seat_state seat = {&s->state.u_mm[0][0], s->seat.normal_N};
+    const struct level *level = &s->level[LEVEL_MAIN];
+    const struct seat_state seat = {&level->state.u_mm[0][0], level->seat.normal_N};
     struct strain_field field;
-    TRY(strain_field_init(&field, &s->mesh, &s->state.u_mm[0][0], err));
-    const struct strain_measures most = strain_muscle_maxima(&s->mesh, &field);
-    r->strain.eps_max = eps_max_of(&axis);
-    r->strain.eps_max_depth_mm = axis.depth_mm;
+    measure_axis(s);
+    TRY(strain_field_init(&field, &level->mesh, &level->state.u_mm[0][0], err));
+    const struct strain_measures most = strain_muscle_maxima(&level->mesh, &field);
     r->strain.E_shear_max = most.green_lagrange_shear;
     r->strain.E_comp_max = most.green_lagrange_compression;
-    r->numerics.eps_max_error =
-        fabs(axis.recovered - axis.raw) / 2 + error_allowance * r->strain.eps_max;
-    r->muscle_volume_mm3 = side_extent(strain_muscle_volume_mm3(&s->mesh, &field));
+    r->muscle_volume_mm3 = side_extent(strain_muscle_volume_mm3(&level->mesh, &field));
     r->threshold_force_shear_N =
         crossing_N(r, offsetof(struct ischia_load_point, E_shear_max), ISCHIA_E_SHEAR_THRESHOLD);
     r->threshold_force_compression_N =
         crossing_N(r, offsetof(struct ischia_load_point, E_comp_max), ISCHIA_E_COMP_THRESHOLD);
-    enum ischia_code code = clusters_find_all(&s->mesh, &field, r->clusters, err);
+    enum ischia_code code = clusters_find_all(&level->mesh, &field, r->clusters, err);
     strain_field_finish(&field);
     TRY(code);
-    r->seat.displacement_mm = s->state.d_mm;
-    return seat_pressure(&s->mesh, &seat, &r->seat, err);
+    r->seat.displacement_mm = level->state.d_mm;
+    return seat_pressure(&level->mesh, &seat, &r->seat, err);
 }
 
 /* The checks that a converged load path must still pass. */
 static void judge(struct solve *s)
 {
     struct ischia_numerics *n = &s->result.numerics;
-    n->det_F_min = body_det_F_min(&s->body, (const double(*)[3])s->state.u_mm);
+    const struct level *level = &s->level[LEVEL_MAIN];
+    n->det_F_min = body_det_F_min(&level->body, (const double(*)[3])level->state.u_mm);
     if (n->reason < 0) return;
     if (!(n->det_F_min > 0) || !(fabs(n->energy_residual) <= energy_residual_max)) {
         n->reason = ISCHIA_DIVERGED_CHECKS;
@@ -204,45 +285,59 @@ static void judge(struct solve *s)
     }
 }
 
-static void take_report(struct solve *s, const struct path_report *report)
+static void take_reports(struct solve *s)
 {
     struct ischia_numerics *n = &s->result.numerics;
+    const struct level *level = &s->level[LEVEL_MAIN];
+    const struct path_report *report = &level->report;
     n->reason = report->reason;
-    n->elements = s->mesh.element_count;
-    n->dof = s->assembly->n + 1;
+    n->elements = level->mesh.element_count;
+    n->dof = level->assembly->n + 1;
     n->load_steps = report->load_steps;
-    n->newton_iterations = report->newton_iterations;
-    n->factorisations = report->factorisations;
     n->force_residual = report->force_residual;
     n->energy_residual = report->energy_residual;
     n->last_converged_F_N = side_force_N(report->last_force_N);
+    for (int l = 0; l < LEVEL_COUNT; l++) {
+        n->newton_iterations += s->level[l].report.newton_iterations;
+        n->factorisations += s->level[l].report.factorisations;
+    }
     (void)snprintf(n->detail, sizeof n->detail, "%s", report->tried);
 }
 
-static enum ischia_code keep_field(struct solve *s, struct ischia_field *ret,
+static enum ischia_code keep_field(const struct level *level, struct ischia_field *ret,
                                    struct ischia_error *err)
 {
-    const size_t numbers = 3 * (size_t)s->mesh.node_count;
+    const size_t numbers = 3 * (size_t)level->mesh.node_count;
     ret->displacement_mm = malloc(numbers * sizeof *ret->displacement_mm);
     CHECK(ret->displacement_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the field");
-    memcpy(ret->displacement_mm, s->state.u_mm, numbers * sizeof *ret->displacement_mm);
-    ret->node_count = (size_t)s->mesh.node_count;
+    memcpy(ret->displacement_mm, level->state.u_mm, numbers * sizeof *ret->displacement_mm);
+    ret->node_count = (size_t)level->mesh.node_count;
     return ISCHIA_OK;
+}
+
+static enum ischia_code solve_level(struct solve *s, int l, struct ischia_solver *solver,
+                                    struct ischia_error *err)
+{
+    const struct path_observer observer = {report_iteration, record_step, s};
+    struct level *level = &s->level[l];
+    s->current = l;
+    TRY(level_init(s, l, solver, err));
+    return path_follow(&level->body, level->assembly, &level->seat,
+                       quarter_force_N(s->c->param[ISCHIA_F]), &observer, &level->state,
+                       &level->report, err);
 }
 
 static enum ischia_code solve_run(struct solve *s, struct ischia_solver *solver,
                                   struct ischia_field *ret_field, struct ischia_error *err)
 {
-    const struct path_observer observer = {report_iteration, record_step, s};
-    struct path_report report;
-    TRY(solve_init(s, solver, err));
-    TRY(path_follow(&s->body, s->assembly, &s->seat, quarter_force_N(s->c->param[ISCHIA_F]),
-                    &observer, &s->state, &report, err));
-    take_report(s, &report);
+    if (mesh_companions[s->c->resolution].across > 0)
+        TRY(solve_level(s, LEVEL_COMPANION, solver, err));
+    TRY(solve_level(s, LEVEL_MAIN, solver, err));
+    take_reports(s);
     TRY(measure(s, err));
     judge(s);
     if (ret_field != NULL && ischia_result_converged(&s->result))
-        return keep_field(s, ret_field, err);
+        return keep_field(&s->level[LEVEL_MAIN], ret_field, err);
     return ISCHIA_OK;
 }
 

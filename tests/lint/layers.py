@@ -44,7 +44,6 @@ FOREIGN = {
     "linux/audit.h": "server/sandbox.c",
     "linux/filter.h": "server/sandbox.c",
     "linux/landlock.h": "server/sandbox.c",
-    "linux/seccomp.h": "server/sandbox.c",
 }
 
 # What a program must never load, directly or through a library of ours.

@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "server/admin.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "server/audit.h"
+#include "server/auth.h"
+#include "server/store/store.h"
+
+const char admin_help[] =
+    "  token create [scope=read,assess] [expires=30d] [name=TEXT]\n"
+    "      Makes an access token and shows it once. Scopes: read, assess, admin. From the first\n"
+    "      token on every request needs one.\n"
+    "  token list            Shows the tokens, without their secrets.\n"
+    "  token revoke ID       Makes a token invalid within a second.\n"
+    "  audit verify          Checks the chain of the audit log and prints its head.\n"
+    "  audit list            Prints the audit log.\n"
+    "  backup FILE           Copies the whole store into a new file, while the daemon runs or "
+    "not.\n"
+    "  restore FILE          Replaces the content of the store by that of a backup.\n";
+
+static int complain(const struct ischia_error *err)
+{
+    (void)fprintf(stderr, "ischiad: %s\n", err->message);
+    return err->code == ISCHIA_E_INPUT ? ADMIN_USAGE : ADMIN_FAILED;
+}
+
+static const char *location(const struct config *config)
+{
+    return config->store[0] == '\0' ? config->state_dir : config->store;
+}
+
+/* -------------------------------------------------------------------------- tokens */
+
+/* "30d", "12h", "45m" from now -> Unix ms; false when it is none of these. */
+static bool parse_expiry(const char *text, int64_t *ret_ms)
+{
+    static const struct {
+        char unit;
+        int64_t seconds;
+    } units[] = {{'d', 86400}, {'h', 3600}, {'m', 60}, {'s', 1}};
+    char *end = NULL;
+    errno = 0;
+    const long number = strtol(text, &end, 10);
+    if (errno != 0 || end == text || number < 1 || number > 100000) return false;
+    for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {
+        if (end[0] != units[i].unit || end[1] != '\0') continue;
+        *ret_ms = ((int64_t)time(NULL) + number * units[i].seconds) * 1000;
+        return true;
+    }
+    return false;
+}
+
+struct token_wish {
+    unsigned scopes;
+    int64_t expires_ms;
+    const char *name;
+};
+
+static enum ischia_code parse_wish(struct token_wish *wish, const char *word,
+                                   struct ischia_error *err)
+{
+    const char *equals = strchr(word, '=');
+    CHECK(equals != NULL, err, ISCHIA_E_INPUT, "token create: '%.40s' is not NAME=VALUE", word);
+    const size_t length = (size_t)(equals - word);
+    if (strncmp(word, "scope", length) == 0) {
+        wish->scopes = auth_parse_scopes(equals + 1);
+        CHECK(wish->scopes != 0, err, ISCHIA_E_INPUT,
+              "token create: scope is '%.40s'; accepted read, assess, admin, with commas between",
+              equals + 1);
+    } else if (strncmp(word, "expires", length) == 0) {
+        CHECK(parse_expiry(equals + 1, &wish->expires_ms), err, ISCHIA_E_INPUT,
+              "token create: expires is '%.40s'; write 30d, 12h or 45m", equals + 1);
+    } else if (strncmp(word, "name", length) == 0) {
+        wish->name = equals + 1;
+    } else {
+        return FAIL(err, ISCHIA_E_INPUT, "token create takes scope, expires and name, not '%.40s'",
+                    word);
+    }
+    return ISCHIA_OK;
+}
+
+static enum ischia_code token_create(struct store *store, char *const *words, int count,
+                                     struct ischia_error *err)
+{
+    struct token_wish wish = {AUTH_READ | AUTH_ASSESS, 0, ""};
+    char token[AUTH_TOKEN_BYTES];
+    for (int i = 0; i < count; i++) TRY(parse_wish(&wish, words[i], err));
+    TRY(auth_token_create(store, wish.scopes, wish.expires_ms, wish.name, token, err));
+    (void)printf("%s\n", token);
+    (void)fprintf(stderr,
+                  "This is shown once: keep it now. Send it as `Authorization: Bearer …`.\n");
+    return ISCHIA_OK;
+}
+
+static enum ischia_code token_list(struct store *store, char *const *words, int count,
+                                   struct ischia_error *err)
+{
+    (void)words;
+    (void)count;
+    return auth_token_list(store, stdout, err);
+}
+
+static enum ischia_code token_revoke(struct store *store, char *const *words, int count,
+                                     struct ischia_error *err)
+{
+    (void)count;
+    return auth_token_revoke(store, words[0], err);
+}
+
+/* --------------------------------------------------------------------------- audit */
+
+static enum ischia_code verify(struct store *store, char *const *words, int count,
+                               struct ischia_error *err)
+{
+    (void)words;
+    (void)count;
+    return audit_verify(store, stdout, err);
+}
+
+static enum ischia_code list(struct store *store, char *const *words, int count,
+                             struct ischia_error *err)
+{
+    (void)words;
+    (void)count;
+    return audit_list(store, stdout, err);
+}
+
+static enum ischia_code backup(struct store *store, char *const *words, int count,
+                               struct ischia_error *err)
+{
+    (void)count;
+    return store_backup(store, words[0], err);
+}
+
+/* ------------------------------------------------------------------------ dispatch */
+
+struct command {
+    const char *noun, *verb; /* verb NULL: none */
+    int words_min, words_max;
+    enum ischia_code (*run)(struct store *store, char *const *words, int count,
+                            struct ischia_error *err);
+    const char *audit; /* what the audit log calls it; NULL: nothing was changed */
+};
+
+static const struct command commands[] = {
+    {"token", "create", 0, 3, token_create, "token.create"},
+    {"token", "list", 0, 0, token_list, NULL},
+    {"token", "revoke", 1, 1, token_revoke, "token.revoke"},
+    {"audit", "verify", 0, 0, verify, NULL},
+    {"audit", "list", 0, 0, list, NULL},
+    {"backup", NULL, 1, 1, backup, "backup"},
+};
+
+static enum ischia_code run_command(const struct config *config, const struct command *command,
+                                    char *const *words, int count, struct ischia_error *err)
+{
+    const struct store_options options = {.location = location(config), .mode = STORE_ADMIN};
+    struct store *store = NULL;
+    TRY(store_open(&options, &store, err));
+    enum ischia_code code = command->run(store, words, count, err);
+    if (code == ISCHIA_OK && command->audit != NULL) {
+        const struct store_audit row = {.who = "admin",
+                                        .what = command->audit,
+                                        .subject = command->words_min == 1 ? words[0] : "",
+                                        .outcome = "ok",
+                                        .detail = ""};
+        code = store_audit_append(store, &row, err);
+    }
+    store_close(store);
+    return code;
+}
+
+static const struct command *find_command(char *const *words, int count, int *ret_used)
+{
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        const struct command *c = &commands[i];
+        const int used = c->verb == NULL ? 1 : 2;
+        if (count < used || strcmp(words[0], c->noun) != 0) continue;
+        if (c->verb != NULL && strcmp(words[1], c->verb) != 0) continue;
+        if (count - used < c->words_min || count - used > c->words_max) continue;
+        *ret_used = used;
+        return c;
+    }
+    return NULL;
+}
+
+int admin_run(const struct config *config, char *const *words, int count)
+{
+    struct ischia_error err;
+    int used = 0;
+    if (count == 2 && strcmp(words[0], "restore") == 0) {
+        if (store_restore(location(config), words[1], &err) != ISCHIA_OK) return complain(&err);
+        return ADMIN_OK;
+    }
+    const struct command *command = find_command(words, count, &used);
+    if (command == NULL) {
+        (void)fprintf(stderr, "ischiad: no such command, or not with these words. Commands:\n%s",
+                      admin_help);
+        return ADMIN_USAGE;
+    }
+    if (run_command(config, command, words + used, count - used, &err) != ISCHIA_OK)
+        return complain(&err);
+    return ADMIN_OK;
+}

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SERVER_AUTH_H
+#define ISCHIA_SERVER_AUTH_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include "server/store/store.h"
+#include "solver/error.h"
+
+/*
+ * Access tokens. A token is "ischia_" + 16 hex digits (its id) + "_" + 43 characters of base64url
+ * (256 random bits). The store keeps a BLAKE2b hash of the secret only: the bits are random, so a
+ * slow password hash would add nothing but a way to exhaust the server.
+ *
+ * A running daemon keeps the tokens in memory and notices within a second when one was added or
+ * revoked, also by another process.
+ */
+
+enum auth_scope {
+    AUTH_READ = 1,   /* read assessments, changes, metrics   */
+    AUTH_ASSESS = 2, /* submit and cancel                    */
+    AUTH_ADMIN = 4   /* erase; holds the other two           */
+};
+enum { AUTH_ALL = AUTH_READ | AUTH_ASSESS | AUTH_ADMIN };
+
+enum { AUTH_ID_BYTES = 17, AUTH_TOKEN_BYTES = 80, AUTH_TOKENS_MAX = 4096 };
+
+struct auth_identity {
+    char id[AUTH_ID_BYTES]; /* the token's; "-" where no tokens are needed */
+    unsigned scopes;        /* bits of enum auth_scope */
+};
+
+enum auth_verdict { AUTH_GRANTED, AUTH_NO_TOKEN, AUTH_BAD_TOKEN, AUTH_EXPIRED };
+
+struct auth;
+
+/* Reads the store's tokens. *ret is the caller's to destroy; the store must outlive it. */
+ISCHIA_MUST_CHECK enum ischia_code auth_create(struct auth **ret, struct store *store,
+                                               struct ischia_error *err);
+void auth_destroy(struct auth *auth); /* NULL allowed */
+
+/* True when at least one token exists that is not revoked, expired or not: then every request needs
+ * one. */
+bool auth_has_tokens(struct auth *auth);
+
+/*
+ * Judges an Authorization header (NULL: none) at now_ms (Unix time): "Bearer TOKEN", or "Basic"
+ * with the token as password, which lets a browser ask for it. Takes the same time whether or not
+ * the id exists. With no tokens everything is granted. May be called from any thread.
+ */
+enum auth_verdict auth_check(struct auth *auth, const char *header, int64_t now_ms,
+                             struct auth_identity *ret_identity);
+
+/* "read,assess" -> bits; 0 when a word is unknown. */
+unsigned auth_parse_scopes(const char *text);
+
+/* The administration commands. create returns the whole token, which is nowhere else. expires_ms 0:
+ * never. name: what it is for. ISCHIA_E_STATE when an id to revoke does not exist. */
+ISCHIA_MUST_CHECK enum ischia_code
+auth_token_create(struct store *store, unsigned scopes, int64_t expires_ms, const char *name,
+                  char ret_token[AUTH_TOKEN_BYTES], struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code auth_token_list(struct store *store, FILE *out,
+                                                   struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code auth_token_revoke(struct store *store, const char *id,
+                                                     struct ischia_error *err);
+
+#endif

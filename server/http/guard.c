@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "server/http/guard.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+#include <time.h>
+
+#include "server/http/listen.h"
+#include "server/http/query.h"
+#include "server/http/reply.h"
+#include "server/log.h"
+#include "server/metrics.h"
+
+static int64_t unix_ms(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+static bool is_own_host(const struct service *service, const char *host)
+{
+    char own[LISTEN_ADDRESS_BYTES];
+    if (strcmp(host, "localhost") == 0 || listen_text_is_loopback(host)) return true;
+    if (query_list_has(service->config.allowed_hosts, host)) return true;
+    return query_host(http_address(service->http), own, sizeof own) && strcmp(host, own) == 0;
+}
+
+/* A name that is rebound to us reaches us with a Host of its own. Where tokens are needed it gains
+ * nothing by that, so that a server with tokens and no list of names takes any. */
+static bool host_is_ours(const struct call *call)
+{
+    char host[256];
+    const char *header = http_request_header(call->request, "Host");
+    if (header == NULL || !query_host(header, host, sizeof host)) return false;
+    if (is_own_host(call->service, host)) return true;
+    return call->service->config.allowed_hosts[0] == '\0' && auth_has_tokens(call->service->auth);
+}
+
+/* "https://name:port" against the Host that was asked for. */
+static bool origin_is_ours(const struct call *call, const char *origin)
+{
+    const char *host = http_request_header(call->request, "Host");
+    const char *name = strstr(origin, "://");
+    if (query_list_has(call->service->config.allowed_origins, origin)) return true;
+    return host != NULL && name != NULL && strcasecmp(name + 3, host) == 0;
+}
+
+static bool changes_something(const struct call *call)
+{
+    const enum http_method method = call->request->method;
+    return method != HTTP_GET && method != HTTP_HEAD && method != HTTP_OPTIONS;
+}
+
+/* Browsers say where a request comes from; programs say nothing and are no danger here. */
+static bool origin_is_fine(const struct call *call)
+{
+    const char *origin = http_request_header(call->request, "Origin");
+    const char *site = http_request_header(call->request, "Sec-Fetch-Site");
+    if (!changes_something(call)) return true;
+    if (origin != NULL) return origin_is_ours(call, origin);
+    return site == NULL || strcmp(site, "same-origin") == 0 || strcmp(site, "none") == 0;
+}
+
+/* The address that asks: behind a proxy the one that the proxy names. */
+static void find_client(struct call *call)
+{
+    const char *forwarded = http_request_header(call->request, "X-Forwarded-For");
+    const bool trusted = call->service->config.behind_proxy && forwarded != NULL;
+    if (trusted && query_forwarded_for(forwarded, call->client, sizeof call->client)) return;
+    (void)snprintf(call->client, sizeof call->client, "%s", call->request->peer);
+}
+
+static bool within_rate(struct call *call, struct http_response *ret)
+{
+    struct service *service = call->service;
+    const int limit = atomic_load_explicit(&service->rate_limit, memory_order_relaxed);
+    const int burst = atomic_load_explicit(&service->rate_burst, memory_order_relaxed);
+    const bool local = call->who.id[0] == '-' && listen_text_is_loopback(call->client);
+    if (limit == 0 || local) return true;
+    const int wait_s = rate_take(service->rate, call->client, limit, burst, http_now_ms());
+    if (wait_s == 0) return true;
+    metrics_count(METRIC_REFUSED_RATE);
+    http_header(ret, "Retry-After", "%d", wait_s);
+    reply_refusal(call->request, ret, PROBLEM_RATE,
+                  "This client sends more than %d requests a second; wait %d s.", limit, wait_s);
+    return false;
+}
+
+static bool refuse_unknown(struct call *call, enum auth_verdict verdict, struct http_response *ret)
+{
+    static const char *const details[] = {
+        [AUTH_GRANTED] = "",
+        [AUTH_NO_TOKEN] = "Send a token: `Authorization: Bearer TOKEN`.",
+        [AUTH_BAD_TOKEN] = "This token is not known, or was revoked.",
+        [AUTH_EXPIRED] = "This token has expired.",
+    };
+    metrics_count(METRIC_REFUSED_AUTH);
+    /* Refused without a token: that is how a browser learns to ask for one; not worth a record. */
+    if (verdict != AUTH_NO_TOKEN)
+        (void)audit_change(call->service->audit, "-", "access", call->id_text, "401");
+    http_header_static(ret, "WWW-Authenticate",
+                       "Bearer realm=\"ischia\", Basic realm=\"ischia\", charset=\"UTF-8\"");
+    reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED, "%s", details[verdict]);
+    return false;
+}
+
+static const char *scope_name(unsigned scope)
+{
+    if (scope & AUTH_ADMIN) return "admin";
+    return scope & AUTH_ASSESS ? "assess" : "read";
+}
+
+static bool authorize(struct call *call, struct http_response *ret)
+{
+    const unsigned needed = call->route == NULL ? 0 : call->route->scope;
+    const char *header = http_request_header(call->request, "Authorization");
+    const enum auth_verdict verdict =
+        auth_check(call->service->auth, header, unix_ms(), &call->who);
+    if (verdict == AUTH_GRANTED && call->who.id[0] != '-')
+        (void)snprintf(call->client, sizeof call->client, "%s", call->who.id);
+    if (!within_rate(call, ret)) return false;
+    if (needed == 0) return true;
+    if (verdict != AUTH_GRANTED) return refuse_unknown(call, verdict, ret);
+    if ((call->who.scopes & needed) == needed) return true;
+    metrics_count(METRIC_REFUSED_AUTH);
+    (void)audit_change(call->service->audit, call->who.id, "access", call->id_text, "403");
+    reply_refusal(call->request, ret, PROBLEM_FORBIDDEN, "This needs a token with the scope '%s'.",
+                  scope_name(needed));
+    return false;
+}
+
+bool guard_admit(struct call *call, struct http_response *ret)
+{
+    call->who = (struct auth_identity){.id = "-", .scopes = 0};
+    find_client(call);
+    if (!host_is_ours(call)) {
+        metrics_count(METRIC_REFUSED_ORIGIN);
+        reply_refusal(call->request, ret, PROBLEM_FORBIDDEN,
+                      "The Host of this request is not a name of this service; the option "
+                      "allowed_hosts lists its names.");
+        return false;
+    }
+    if (!origin_is_fine(call)) {
+        metrics_count(METRIC_REFUSED_ORIGIN);
+        reply_refusal(call->request, ret, PROBLEM_FORBIDDEN,
+                      "A page of another origin may not change anything here; the option "
+                      "allowed_origins lists those that may.");
+        return false;
+    }
+    return authorize(call, ret);
+}
+
+/* The clinic page: its own scripts and styles, pictures it draws, and nobody else's anything. */
+static const char page_policy[] =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; font-src 'self'; worker-src 'self' blob:; manifest-src 'self'; "
+    "form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
+static const char document_policy[] = "default-src 'none'; frame-ancestors 'none'";
+/* An SVG opened by itself draws with style attributes; it may do nothing else. */
+static const char picture_policy[] = "default-src 'none'; style-src 'unsafe-inline'; sandbox";
+
+static const char *policy_of(const char *type)
+{
+    if (type == NULL) return document_policy;
+    if (strncmp(type, "text/html", 9) == 0) return page_policy;
+    return strncmp(type, "image/svg", 9) == 0 ? picture_policy : document_policy;
+}
+
+void guard_headers(const struct call *call, struct http_response *response)
+{
+    http_header_static(response, "Content-Security-Policy", policy_of(response->type));
+    http_header_static(response, "X-Content-Type-Options", "nosniff");
+    http_header_static(response, "X-Frame-Options", "DENY");
+    /* Not no-referrer: under it a browser sends a plain form's Origin as null, which is refused. */
+    http_header_static(response, "Referrer-Policy", "same-origin");
+    http_header_static(response, "Cross-Origin-Resource-Policy", "same-origin");
+    http_header_static(response, "Cross-Origin-Opener-Policy", "same-origin");
+    http_header_static(response, "Permissions-Policy", "camera=(), geolocation=(), microphone=()");
+    if (call != NULL && call->request->tls)
+        http_header_static(response, "Strict-Transport-Security", "max-age=31536000");
+}

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SERVER_PAGE_H
+#define ISCHIA_SERVER_PAGE_H
+
+#include <stddef.h>
+
+#include "api/faults.h"
+#include "api/text.h"
+#include "server/http/assets.h"
+#include "server/http/http.h"
+#include "server/http/service.h"
+
+/* HTML that needs no JavaScript. Everything that did not come from our own tables is escaped. */
+
+/* Adds markup of ours as it is. */
+void page_put(struct text_out *out, const char *html);
+/* Adds text with the characters that mean something in HTML escaped. */
+void page_escape(struct text_out *out, const char *text);
+/* The same, printf-style; cut after 1 KiB. */
+__attribute__((format(printf, 2, 3))) void page_format(struct text_out *out, const char *format,
+                                                       ...);
+/* Starts a document in an empty out. It loads itself again after refresh_s seconds; 0: never. */
+void page_begin(struct text_out *out, const char *title, int refresh_s);
+/* Closes what page_begin opened. */
+void page_end(struct text_out *out);
+
+/* The plain form, made from the parameter table. body: what was sent (NULL: nothing) to fill it
+ * with; faults: shown beside their fields, and then the status is 422. */
+void page_form(struct call *call, const char *body, size_t size, const struct doc_faults *faults,
+               struct http_response *ret);
+
+/* An embedded file, with its tag, compressed for those who take it; 404 when asset is NULL. */
+void page_asset(struct call *call, const struct asset *asset, struct http_response *ret);
+
+#endif

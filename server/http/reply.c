@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "server/http/reply.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "server/http/query.h"
+#include "server/log.h"
+
+/* The path alone: a query may hold a subject. */
+static void set_instance(struct problem *problem, const struct http_request *request)
+{
+    if (request == NULL || problem->instance[0] != '\0') return;
+    (void)snprintf(problem->instance, sizeof problem->instance, "%.*s",
+                   (int)strcspn(request->target, "?"), request->target);
+}
+
+void reply_problem(const struct http_request *request, struct problem *problem,
+                   struct http_response *ret)
+{
+    static const char no_memory[] = "{\"type\":\"/docs#problem-out-of-memory\","
+                                    "\"title\":\"Out of memory\",\"status\":503}";
+    struct ischia_error err;
+    char *text = NULL;
+    ret->status = problem_kinds[problem->kind].status;
+    ret->action = HTTP_SEND;
+    ret->etag[0] = '\0';
+    set_instance(problem, request);
+    http_header_static(ret, "Cache-Control", "no-store");
+    if (problem_doc_text(&text, problem, &err) == ISCHIA_OK) {
+        http_body(ret, PROBLEM_MEDIA_TYPE, text, strlen(text));
+        return;
+    }
+    ret->status = 503;
+    http_body_static(ret, PROBLEM_MEDIA_TYPE, no_memory, sizeof no_memory - 1);
+}
+
+void reply_refusal(const struct http_request *request, struct http_response *ret,
+                   enum problem_kind kind, const char *format, ...)
+{
+    struct problem problem;
+    char detail[sizeof problem.detail];
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(detail, sizeof detail, format, arguments);
+    va_end(arguments);
+    problem_init(&problem, kind, "%s", detail);
+    reply_problem(request, &problem, ret);
+}
+
+static enum problem_kind failure_kind(enum ischia_code code)
+{
+    if (code == ISCHIA_E_MEMORY || code == ISCHIA_E_STATE || code == ISCHIA_E_IO)
+        return PROBLEM_UNAVAILABLE;
+    return PROBLEM_INTERNAL;
+}
+
+void reply_failure(const struct http_request *request, struct http_response *ret,
+                   const struct ischia_error *err)
+{
+    struct log_value message;
+    LOG_ERROR("request failed", "code=%s detail=%s where=%s:%d", ischia_code_name(err->code),
+              log_quote(&message, err->message), err->file == NULL ? "?" : err->file, err->line);
+    http_header_static(ret, "Retry-After", "5");
+    reply_refusal(request, ret, failure_kind(err->code),
+                  "The service could not do this now; nothing was changed. Its log says why.");
+}
+
+void reply_no_assessment(const struct call *call, struct http_response *ret)
+{
+    reply_refusal(call->request, ret, PROBLEM_NOT_FOUND,
+                  "There is no assessment with this id: it never existed, or it was erased.");
+}
+
+void reply_text(const struct http_request *request, struct http_response *ret, int status,
+                const char *type, struct text_out *out)
+{
+    struct ischia_error err;
+    char *text = NULL;
+    size_t length = 0;
+    if (text_out_take(out, &text, &length, &err) != ISCHIA_OK) {
+        reply_failure(request, ret, &err);
+        return;
+    }
+    ret->status = status;
+    http_body(ret, type, text, length);
+}
+
+bool reply_not_modified(const struct http_request *request, struct http_response *ret)
+{
+    const char *known = http_request_header(request, "If-None-Match");
+    if (known == NULL || !query_etag_matches(known, ret->etag)) return false;
+    ret->status = 304;
+    return true;
+}

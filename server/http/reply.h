@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SERVER_REPLY_H
+#define ISCHIA_SERVER_REPLY_H
+
+#include "api/problem_doc.h"
+#include "api/text.h"
+#include "server/http/http.h"
+#include "server/http/service.h"
+
+/* Answers that every route gives. `request` may be NULL where there is none. */
+
+/* The problem, with its status and the request's path (never its query) as instance. */
+void reply_problem(const struct http_request *request, struct problem *problem,
+                   struct http_response *ret);
+/* A problem with nothing but a detail (printf-style). */
+__attribute__((format(printf, 4, 5))) void
+reply_refusal(const struct http_request *request, struct http_response *ret, enum problem_kind kind,
+              const char *format, ...);
+/* A call that failed for reasons of ours: 500, 503 or 507, logged; the details stay in the log. */
+void reply_failure(const struct http_request *request, struct http_response *ret,
+                   const struct ischia_error *err);
+/* 404: no such assessment. */
+void reply_no_assessment(const struct call *call, struct http_response *ret);
+
+/* Hands the text over as the body; what failed while it was written is a failure. */
+void reply_text(const struct http_request *request, struct http_response *ret, int status,
+                const char *type, struct text_out *out);
+
+/* True, with ret made a 304, when the client has this representation already. Sets the ETag. */
+bool reply_not_modified(const struct http_request *request, struct http_response *ret);
+
+#endif

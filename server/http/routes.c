@@ -1,0 +1,399 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "server/http/routes.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/problem_doc.h"
+#include "server/http/guard.h"
+#include "server/http/query.h"
+#include "server/http/reply.h"
+#include "server/log.h"
+#include "server/metrics.h"
+
+enum { CASE_BYTES_MAX = 64 * 1024, EMPTY_BODY_BYTES_MAX = 1024, ROUTES_MAX = 64 };
+
+#define JSON       "application/json"
+#define FORM       "application/x-www-form-urlencoded"
+#define HTML       "text/html; charset=utf-8"
+#define TYPES(...) ((const char *const[]){__VA_ARGS__, NULL})
+#define ASSESSMENT "/v1/assessments/{id}"
+
+const struct route routes[] = {
+    {HTTP_POST, "/v1/assessments", "POST /v1/assessments", handle_submit, AUTH_ASSESS,
+     CASE_BYTES_MAX, TYPES(JSON, FORM), TYPES(JSON, "text/html"), NULL, "assessment.create", false},
+    {HTTP_GET, "/v1/assessments", "GET /v1/assessments", handle_list, AUTH_READ, 0, NULL,
+     TYPES(JSON, "text/csv"), TYPES("subject", "side", "status", "limit", "cursor"),
+     "assessment.list", false},
+    {HTTP_GET, ASSESSMENT, "GET " ASSESSMENT, handle_get, AUTH_READ, 0, NULL, TYPES(JSON), NULL,
+     "assessment.read", false},
+    {HTTP_DELETE, ASSESSMENT, "DELETE " ASSESSMENT, handle_erase, AUTH_ADMIN, EMPTY_BODY_BYTES_MAX,
+     NULL, NULL, NULL, "assessment.erase", false},
+    {HTTP_POST, ASSESSMENT "/cancel", "POST " ASSESSMENT "/cancel", handle_cancel, AUTH_ASSESS,
+     EMPTY_BODY_BYTES_MAX, NULL, TYPES(JSON), NULL, "assessment.cancel", false},
+    {HTTP_GET, ASSESSMENT "/events", "GET " ASSESSMENT "/events", handle_events, AUTH_READ, 0, NULL,
+     TYPES("text/event-stream"), NULL, "assessment.read", false},
+    {HTTP_GET, ASSESSMENT "/field.vtu", "GET " ASSESSMENT "/field.vtu", handle_field, AUTH_READ, 0,
+     NULL, TYPES("application/vnd.vtk.vtu", "application/xml"), NULL, "assessment.read", false},
+    {HTTP_GET, ASSESSMENT "/section.svg", "GET " ASSESSMENT "/section.svg", handle_section,
+     AUTH_READ, 0, NULL, TYPES("image/svg+xml"), NULL, "assessment.read", false},
+    {HTTP_GET, ASSESSMENT "/report", "GET " ASSESSMENT "/report", handle_report, AUTH_READ, 0, NULL,
+     TYPES("text/html"), NULL, "assessment.read", false},
+    {HTTP_GET, "/v1/parameters", "GET /v1/parameters", handle_parameters, 0, 0, NULL, TYPES(JSON),
+     NULL, NULL, false},
+    {HTTP_GET, "/v1/changes", "GET /v1/changes", handle_changes, AUTH_READ, 0, NULL, TYPES(JSON),
+     TYPES("since", "limit"), "changes.read", false},
+    {HTTP_GET, "/openapi.json", "GET /openapi.json", handle_openapi, 0, 0, NULL, TYPES(JSON), NULL,
+     NULL, false},
+    {HTTP_GET, "/healthz", "GET /healthz", handle_health, 0, 0, NULL, TYPES(JSON), NULL, NULL,
+     false},
+    {HTTP_GET, "/readyz", "GET /readyz", handle_ready, 0, 0, NULL, TYPES(JSON), NULL, NULL, false},
+    {HTTP_GET, "/metrics", "GET /metrics", handle_metrics, AUTH_READ, 0, NULL, TYPES("text/plain"),
+     NULL, NULL, false},
+    {HTTP_GET, "/version", "GET /version", handle_version, 0, 0, NULL, TYPES(JSON), NULL, NULL,
+     false},
+    {HTTP_GET, "/docs", "GET /docs", handle_docs, 0, 0, NULL, TYPES("text/html"), NULL, NULL, true},
+    {HTTP_GET, "/", "GET /", handle_home, 0, 0, NULL, TYPES("text/html"), TYPES("from"), NULL,
+     true},
+    {HTTP_GET, "/form", "GET /form", handle_form, 0, 0, NULL, TYPES("text/html"), NULL, NULL, true},
+    {HTTP_GET, "/assessments", "GET /assessments", handle_home, 0, 0, NULL, TYPES("text/html"),
+     TYPES("subject", "side", "status", "limit", "cursor", "with"), NULL, true},
+    {HTTP_GET, "/assessments/{id}", "GET /assessments/{id}", handle_home, 0, 0, NULL,
+     TYPES("text/html"), TYPES("with"), NULL, true},
+    {HTTP_GET, "/assets/{file}", "GET /assets/{file}", handle_asset, 0, 0, NULL, NULL, NULL, NULL,
+     true},
+};
+const size_t route_count = sizeof routes / sizeof routes[0];
+
+/* ------------------------------------------------------------------------- finding */
+
+/* One segment of a path and of a template. */
+static bool segment_matches(const char *template, size_t template_length, const char *path,
+                            size_t length, char *ret_id, size_t id_size)
+{
+    if (template_length != 4 || memcmp(template, "{id}", 4) != 0)
+        return template_length == length && memcmp(template, path, length) == 0;
+    if (length == 0 || length >= id_size) {
+        ret_id[0] = '\0';
+        return length > 0;
+    }
+    memcpy(ret_id, path, length);
+    ret_id[length] = '\0';
+    return true;
+}
+
+static bool path_matches(const char *template, const char *path, char *ret_id, size_t id_size,
+                         char *ret_rest, size_t rest_size)
+{
+    while (*template == '/' && *path == '/') {
+        template ++;
+        path++;
+        const size_t template_length = strcspn(template, "/"), length = strcspn(path, "/");
+        if (strcmp(template, "{file}") == 0) {
+            (void)snprintf(ret_rest, rest_size, "%s", path);
+            return *path != '\0';
+        }
+        if (!segment_matches(template, template_length, path, length, ret_id, id_size))
+            return false;
+        template += template_length;
+        path += length;
+    }
+    return *template == '\0' && *path == '\0';
+}
+
+const struct route *route_find(enum http_method method, const char *path, char *ret_id,
+                               size_t id_size, char *ret_rest, size_t rest_size,
+                               unsigned *ret_allowed)
+{
+    const struct route *found = NULL;
+    const enum http_method wanted = method == HTTP_HEAD ? HTTP_GET : method;
+    *ret_allowed = 0;
+    for (size_t i = 0; i < route_count; i++) {
+        if (!path_matches(routes[i].path, path, ret_id, id_size, ret_rest, rest_size)) continue;
+        *ret_allowed |= 1U << routes[i].method;
+        if (routes[i].method == HTTP_GET) *ret_allowed |= 1U << HTTP_HEAD;
+        if (routes[i].method == wanted) found = &routes[i];
+    }
+    if (*ret_allowed != 0) *ret_allowed |= 1U << HTTP_OPTIONS;
+    return found;
+}
+
+void routes_print(FILE *out)
+{
+    for (size_t i = 0; i < route_count; i++)
+        (void)fprintf(out, "%s %s%s%s%s\n", routes[i].name, routes[i].is_page ? "page " : "",
+                      routes[i].scope == 0           ? "open"
+                      : routes[i].scope == AUTH_READ ? "read"
+                                                     : "",
+                      routes[i].scope == AUTH_ASSESS ? "assess" : "",
+                      routes[i].scope == AUTH_ADMIN ? "admin" : "");
+}
+
+/* ---------------------------------------------------------------------------- calls */
+
+struct deferred *deferred_create(struct call *call)
+{
+    struct deferred *deferred = calloc(1, sizeof *deferred);
+    if (deferred == NULL) return NULL;
+    atomic_store(&deferred->owners, 2);
+    deferred->exchange = call->request->exchange;
+    http_hold(deferred->exchange);
+    call->deferred = deferred;
+    return deferred;
+}
+
+void deferred_drop(struct deferred *deferred)
+{
+    if (atomic_fetch_sub(&deferred->owners, 1) > 1) return;
+    free(deferred->bytes);
+    free(deferred);
+}
+
+void deferred_complete(struct deferred *deferred)
+{
+    struct http_exchange *exchange = deferred->exchange;
+    atomic_store(&deferred->done, true);
+    http_wake(exchange);
+    http_release(exchange);
+    deferred_drop(deferred);
+}
+
+static void wake_call(void *context) { http_wake(context); }
+
+bool call_subscribe(struct call *call)
+{
+    struct ischia_error err;
+    if (call->subscription != NULL) return true;
+    return events_subscribe(call->service->events, &call->id, wake_call, call->request->exchange,
+                            &call->subscription, &err) == ISCHIA_OK;
+}
+
+void call_wait(struct call *call, struct http_response *response)
+{
+    response->action = HTTP_WAIT;
+    response->wake_at_ms = call->deadline_ms;
+}
+
+/* ------------------------------------------------------------------------- dispatch */
+
+static void put_allow(struct http_response *ret, unsigned allowed)
+{
+    char list[64] = "";
+    size_t used = 0;
+    for (int i = 0; i < HTTP_OTHER; i++) {
+        if ((allowed & (1U << i)) == 0) continue;
+        const int n = snprintf(list + used, sizeof list - used, "%s%s", used == 0 ? "" : ", ",
+                               http_method_names[i]);
+        if (n > 0 && (size_t)n < sizeof list - used) used += (size_t)n;
+    }
+    http_header(ret, "Allow", "%s", list);
+}
+
+static bool refuse_route(struct call *call, struct http_response *ret)
+{
+    if (call->allowed == 0) {
+        reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, "There is nothing at this address.");
+        return false;
+    }
+    put_allow(ret, call->allowed);
+    if (call->request->method == HTTP_OPTIONS)
+        ret->status = 204;
+    else
+        reply_refusal(call->request, ret, PROBLEM_METHOD, "The Allow header lists what does.");
+    return false;
+}
+
+static bool takes_type(const struct route *route, const char *content_type)
+{
+    if (content_type == NULL) return false;
+    for (int i = 0; route->takes[i] != NULL; i++)
+        if (query_media_type_is(content_type, route->takes[i])) return true;
+    return false;
+}
+
+static bool agree_on_types(struct call *call, struct http_response *ret)
+{
+    const struct route *route = call->route;
+    const char *content_type = http_request_header(call->request, "Content-Type");
+    if (route->takes != NULL && !takes_type(route, content_type)) {
+        reply_refusal(call->request, ret, PROBLEM_MEDIA_TYPE_WRONG, "Send %s%s%s.", route->takes[0],
+                      route->takes[1] == NULL ? "" : " or ",
+                      route->takes[1] == NULL ? "" : route->takes[1]);
+        return false;
+    }
+    if (route->gives == NULL) return true;
+    call->accepted = query_accept(http_request_header(call->request, "Accept"), route->gives);
+    if (call->accepted >= 0) return true;
+    reply_refusal(call->request, ret, PROBLEM_NOT_ACCEPTABLE, "This is given as %s%s%s.",
+                  route->gives[0], route->gives[1] == NULL ? "" : " or ",
+                  route->gives[1] == NULL ? "" : route->gives[1]);
+    return false;
+}
+
+static bool read_query(struct call *call, struct http_response *ret)
+{
+    static const char *const none[] = {NULL};
+    char name[64];
+    const char *const *known = call->route->queries == NULL ? none : call->route->queries;
+    if (call->route->is_page || !query_unknown(call->request->query, known, name, sizeof name))
+        return true;
+    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
+                  "This address takes no query parameter '%.60s'.", name);
+    return false;
+}
+
+static bool read_path(struct call *call, struct http_response *ret)
+{
+    char path[HTTP_PATH_BYTES], id[64] = "";
+    const char *target = call->request->target;
+    if (!query_decode(target, strcspn(target, "?"), false, path, sizeof path)) {
+        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
+                      "The address is too long or not well formed.");
+        return false;
+    }
+    call->route = route_find(call->request->method, path, id, sizeof id, call->rest,
+                             sizeof call->rest, &call->allowed);
+    if (uuid_parse(id, &call->id)) uuid_format(&call->id, call->id_text);
+    return true;
+}
+
+/* An {id} that no assessment can have is simply not found. */
+static bool has_usable_id(struct call *call, struct http_response *ret)
+{
+    if (strstr(call->route->path, "/v1/") == NULL || strstr(call->route->path, "{id}") == NULL ||
+        call->id_text[0] != '\0')
+        return true;
+    reply_no_assessment(call, ret);
+    return false;
+}
+
+static bool refuse_while_stopping(struct call *call, struct http_response *ret)
+{
+    if (call->request->method == HTTP_GET || call->request->method == HTTP_HEAD ||
+        !atomic_load_explicit(&call->service->draining, memory_order_relaxed))
+        return true;
+    http_header_static(ret, "Retry-After", "10");
+    reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE,
+                  "The service is shutting down; nothing was changed.");
+    return false;
+}
+
+static bool admit(struct call *call, struct http_response *ret)
+{
+    if (!read_path(call, ret) || !guard_admit(call, ret)) return false;
+    if (call->route == NULL) return refuse_route(call, ret);
+    return refuse_while_stopping(call, ret) && has_usable_id(call, ret) &&
+           agree_on_types(call, ret) && read_query(call, ret);
+}
+
+static bool on_head(void *context, struct http_request *request, size_t *ret_body_max,
+                    struct http_response *ret_refusal)
+{
+    struct call *call = calloc(1, sizeof *call);
+    if (call == NULL) {
+        ret_refusal->action = HTTP_DROP;
+        return false;
+    }
+    call->service = context;
+    call->request = request;
+    request->state = call;
+    if (!admit(call, ret_refusal)) {
+        guard_headers(call, ret_refusal);
+        return false;
+    }
+    *ret_body_max = call->route->body_max;
+    return true;
+}
+
+static void on_request(void *context, struct http_request *request, struct http_response *ret)
+{
+    struct call *call = request->state;
+    (void)context;
+    call->route->handler(call, ret);
+    if (ret->action != HTTP_WAIT) guard_headers(call, ret);
+}
+
+static void on_refuse(void *context, struct http_request *request, int status, const char *detail,
+                      struct http_response *ret)
+{
+    const enum problem_kind kind = status == 408   ? PROBLEM_TIMEOUT
+                                   : status == 413 ? PROBLEM_TOO_LARGE
+                                                   : PROBLEM_HEADERS_TOO_LARGE;
+    (void)context;
+    reply_refusal(request, ret, kind, "%s", detail);
+    guard_headers(request == NULL ? NULL : request->state, ret);
+}
+
+/* What was done to which assessment goes into the audit log, whatever came of it. */
+static void record(struct call *call, int status)
+{
+    const struct route *route = call->route;
+    char outcome[8];
+    if (route == NULL || route->audit == NULL || status == 0 || status == 401) return;
+    if (route->method == HTTP_GET) {
+        if (status == 200 || status == 304)
+            (void)audit_read(call->service->audit, call->who.id, route->audit, call->id_text,
+                             http_now_ms());
+        return;
+    }
+    (void)snprintf(outcome, sizeof outcome, "%d", status);
+    (void)audit_change(call->service->audit, call->who.id, route->audit, call->id_text, outcome);
+}
+
+static void on_done(void *context, struct http_request *request, int status)
+{
+    struct call *call = request->state;
+    (void)context;
+    if (call == NULL) return;
+    const double seconds = (double)(http_now_ms() - request->begun_ms) / 1e3;
+    const size_t route = call->route == NULL ? route_count : (size_t)(call->route - routes);
+    if (status != 0) metrics_http(route, status, seconds);
+    record(call, status);
+    events_unsubscribe(call->subscription);
+    if (call->deferred != NULL) deferred_drop(call->deferred);
+    free(call);
+}
+
+static void on_connection(void *context, int change)
+{
+    (void)context;
+    metrics_add(METRIC_CONNECTIONS, change);
+}
+
+static void on_slow_client(void *context)
+{
+    (void)context;
+    metrics_count(METRIC_SLOW_CLIENTS);
+}
+
+static void on_log(void *context, const char *message)
+{
+    struct log_value quoted;
+    (void)context;
+    LOG_DEBUG("http", "detail=%s", log_quote(&quoted, message));
+}
+
+struct http_app service_app(struct service *service)
+{
+    static const char *names[ROUTES_MAX];
+    _Static_assert(sizeof routes / sizeof routes[0] <= ROUTES_MAX, "metrics have room for 64");
+    for (size_t i = 0; i < route_count; i++) names[i] = routes[i].name;
+    metrics_set_routes(names, route_count);
+    return (struct http_app){.context = service,
+                             .on_head = on_head,
+                             .on_request = on_request,
+                             .on_refuse = on_refuse,
+                             .on_done = on_done,
+                             .on_connection = on_connection,
+                             .on_slow_client = on_slow_client,
+                             .on_log = on_log};
+}
+
+void service_apply(struct service *service)
+{
+    atomic_store(&service->rate_limit, service->config.rate_limit);
+    atomic_store(&service->rate_burst, service->config.rate_burst);
+    atomic_store(&service->queue_limit, service->config.queue_limit);
+    audit_set_mode(service->audit, (enum config_audit)service->config.audit);
+    log_set_level((enum log_level)service->config.log_level);
+}

@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include "server/http/versions.h"
+
+#include <gnu/libc-version.h>
+#include <sodium.h>
+#include <stddef.h>
+#include <zlib.h>
+
+#include "api/json.h"
+#include "server/http/http.h"
+#include "server/store/store.h"
+
+const struct version *versions(void)
+{
+    static const struct version rows[] = {
+        {"store", store_engine},
+        {"libmicrohttpd", http_library_version},
+        {"libsodium", sodium_version_string},
+        {"zlib", zlibVersion},
+        {"cJSON", json_library_version},
+        {"glibc", gnu_get_libc_version},
+        {NULL, NULL},
+    };
+    return rows;
+}

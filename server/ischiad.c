@@ -1,0 +1,583 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "server/admin.h"
+#include "server/config.h"
+#include "server/http/listen.h"
+#include "server/http/routes.h"
+#include "server/http/service.h"
+#include "server/log.h"
+#include "server/metrics.h"
+#include "server/notify.h"
+#include "server/sandbox.h"
+
+/*
+ * The daemon. main reads the options; serve is a chain of steps, each with its undoing, and the
+ * loop between them takes signals, so that no signal handler exists.
+ */
+
+enum { EXIT_USAGE = 2, TICK_MS = 1000, RETIRE_EVERY_S = 60, RETIRE_BATCH = 200 };
+enum { SWEEP_AGE_MS = 5 * 60 * 1000, TLS_FILE_BYTES = 256 * 1024 };
+
+extern char **environ;
+
+struct daemon {
+    struct service service;
+    struct arguments *arguments;
+    char *tls_certificate, *tls_key; /* PEM texts */
+    char worker_program[PATH_MAX];
+    int64_t retire_at_ms, watchdog_at_ms;
+};
+
+/* --------------------------------------------------------------------------- options */
+
+enum action { ACT_SERVE, ACT_CHECK, ACT_PRINT, ACT_MAN, ACT_ROUTES, ACT_HELP, ACT_VERSION };
+
+struct arguments {
+    const char *config_path; /* NULL: none */
+    char **flags;            /* pairs: option name, value */
+    int flag_count;
+    char **words;
+    int word_count;
+    enum action action;
+};
+
+static const struct {
+    const char *flag;
+    enum action action;
+} actions[] = {
+    {"check-config", ACT_CHECK},  {"print-config", ACT_PRINT}, {"print-man", ACT_MAN},
+    {"print-routes", ACT_ROUTES}, {"help", ACT_HELP},          {"version", ACT_VERSION},
+};
+
+static bool find_action(const char *flag, struct arguments *ret)
+{
+    for (size_t i = 0; i < sizeof actions / sizeof actions[0]; i++) {
+        if (strcmp(flag, actions[i].flag) != 0) continue;
+        ret->action = actions[i].action;
+        return true;
+    }
+    return false;
+}
+
+static bool is_boolean_option(const char *name)
+{
+    for (size_t i = 0; i < config_option_count; i++)
+        if (strcmp(config_options[i].name, name) == 0)
+            return config_options[i].kind == CONFIG_BOOLEAN;
+    return false;
+}
+
+/* One "--name=value", "--name value" or "--switch"; returns how many words it took. */
+static int parse_flag(struct arguments *ret, char **argv, int left, struct ischia_error *err)
+{
+    char *name = argv[0] + 2, *equals = strchr(name, '=');
+    if (find_action(name, ret)) return 1;
+    if (equals != NULL) *equals = '\0';
+    for (char *c = name; *c != '\0'; c++)
+        if (*c == '-') *c = '_';
+    char *value = equals == NULL ? NULL : equals + 1;
+    static char yes[] = "true";
+    int used = 1;
+    if (value == NULL && is_boolean_option(name)) value = yes;
+    if (value == NULL && left > 1) {
+        value = argv[1];
+        used = 2;
+    }
+    if (value == NULL) {
+        (void)FAIL(err, ISCHIA_E_INPUT, "--%s needs a value", name);
+        return 0;
+    }
+    if (strcmp(name, "config") == 0) {
+        ret->config_path = value;
+        return used;
+    }
+    ret->flags[2 * ret->flag_count] = name;
+    ret->flags[2 * ret->flag_count + 1] = value;
+    ret->flag_count++;
+    return used;
+}
+
+static enum ischia_code parse_arguments(struct arguments *ret, int argc, char **argv,
+                                        struct ischia_error *err)
+{
+    ret->flags = calloc((size_t)argc * 3, sizeof(char *));
+    CHECK(ret->flags != NULL, err, ISCHIA_E_MEMORY, "no memory for the arguments");
+    ret->words = ret->flags + 2 * argc;
+    for (int i = 1; i < argc;) {
+        if (strncmp(argv[i], "--", 2) != 0) {
+            ret->words[ret->word_count++] = argv[i++];
+            continue;
+        }
+        const int used = parse_flag(ret, argv + i, argc - i, err);
+        if (used == 0) return err->code;
+        i += used;
+    }
+    return ISCHIA_OK;
+}
+
+/* Default, file, environment, flags: later ones win. */
+static enum ischia_code load_config(struct config *ret, const struct arguments *arguments,
+                                    struct ischia_error *err)
+{
+    struct config config = config_default();
+    char unknown[256];
+    struct log_value quoted;
+    if (arguments->config_path != NULL) TRY(config_read_file(&config, arguments->config_path, err));
+    TRY(config_read_environment(&config, environ, unknown, sizeof unknown, err));
+    if (unknown[0] != '\0')
+        LOG_WARNING("environment variables that are no options", "names=%s",
+                    log_quote(&quoted, unknown));
+    for (int i = 0; i < arguments->flag_count; i++)
+        TRY(config_set(&config, arguments->flags[2 * i], arguments->flags[2 * i + 1], err));
+    TRY(config_check(&config, err));
+    *ret = config;
+    return ISCHIA_OK;
+}
+
+/* ----------------------------------------------------------------------------- steps */
+
+static enum ischia_code read_text(const char *path, char **ret, struct ischia_error *err)
+{
+    char *text = calloc(1, TLS_FILE_BYTES);
+    CHECK(text != NULL, err, ISCHIA_E_MEMORY, "no memory for %s", path);
+    FILE *file = fopen(path, "re");
+    if (file == NULL) {
+        free(text);
+        return FAIL(err, ISCHIA_E_IO, "cannot open %s: %s", path, strerror(errno));
+    }
+    const size_t size = fread(text, 1, TLS_FILE_BYTES - 1, file);
+    const bool good = ferror(file) == 0 && size > 0;
+    (void)fclose(file);
+    if (!good) free(text);
+    CHECK(good, err, ISCHIA_E_IO, "cannot read %s", path);
+    *ret = text;
+    return ISCHIA_OK;
+}
+
+static enum ischia_code load_tls(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    if (config->tls_certificate[0] == '\0') return ISCHIA_OK;
+    TRY(read_text(config->tls_certificate, &d->tls_certificate, err));
+    return read_text(config->tls_key, &d->tls_key, err);
+}
+
+/* As many descriptors as the system lets us: each connection is one. */
+static void raise_descriptor_limit(void)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+    limit.rlim_cur = limit.rlim_max;
+    (void)setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+static enum ischia_code enter_state_dir(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    (void)umask(077);
+    CHECK(mkdir(config->state_dir, 0700) == 0 || errno == EEXIST, err, ISCHIA_E_IO,
+          "cannot make %s: %s", config->state_dir, strerror(errno));
+    CHECK(setenv("SQLITE_TMPDIR", config->state_dir, 1) == 0, err, ISCHIA_E_MEMORY,
+          "no memory for the environment");
+    if (!config->sandbox) return ISCHIA_OK;
+    const struct sandbox_report report = sandbox_enter(config->state_dir);
+    LOG_INFO("sandbox", "no_new_privileges=%d no_dumps=%d landlock=%d", report.no_new_privileges,
+             report.no_dumps, report.landlock);
+    return ISCHIA_OK;
+}
+
+/* `ischia` beside this program, where a package puts it, or below it, where a build does; else
+ * whatever is on the path. */
+static void find_worker(struct daemon *d)
+{
+    static const char *const places[] = {"ischia", "cli/ischia"};
+    const char *wish = d->service.config.worker_program;
+    char own[PATH_MAX - 16], candidate[PATH_MAX];
+    (void)snprintf(d->worker_program, sizeof d->worker_program, "%s",
+                   wish[0] == '\0' ? "ischia" : wish);
+    const ssize_t n = readlink("/proc/self/exe", own, sizeof own - 1);
+    if (wish[0] != '\0' || n <= 0) return;
+    own[n] = '\0';
+    char *slash = strrchr(own, '/');
+    if (slash == NULL) return;
+    *slash = '\0';
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        (void)snprintf(candidate, sizeof candidate, "%s/%s", own, places[i]);
+        if (access(candidate, X_OK) != 0) continue;
+        (void)snprintf(d->worker_program, sizeof d->worker_program, "%s", candidate);
+        return;
+    }
+}
+
+static enum ischia_code open_store(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    const struct store_options options = {
+        .location = config->store[0] == '\0' ? config->state_dir : config->store,
+        .mode = STORE_SERVE,
+        .idempotency_ms = (int64_t)config->idempotency_hours * 3600 * 1000,
+    };
+    return store_open(&options, &d->service.store, err);
+}
+
+static enum ischia_code create_parts(struct daemon *d, struct ischia_error *err)
+{
+    struct service *s = &d->service;
+    TRY(events_create(&s->events, err));
+    TRY(auth_create(&s->auth, s->store, err));
+    TRY(audit_create(&s->audit, s->store, err));
+    TRY(rate_create(&s->rate, err));
+    return documents_create(&s->documents, err);
+}
+
+/* Open to this machine alone, or closed by tokens and TLS, or behind somebody who sees to that. */
+static enum ischia_code check_access(struct daemon *d, struct ischia_error *err)
+{
+    struct service *s = &d->service;
+    TRY(listen_is_loopback(s->config.listen, &s->on_loopback, err));
+    if (s->on_loopback || s->config.behind_proxy) return ISCHIA_OK;
+    CHECK(d->tls_certificate != NULL, err, ISCHIA_E_INPUT,
+          "%s is not a loopback address and TLS is off: set tls_certificate and tls_key, or give "
+          "--behind-proxy when a reverse proxy does TLS and access control",
+          s->config.listen);
+    CHECK(auth_has_tokens(s->auth), err, ISCHIA_E_INPUT,
+          "%s is not a loopback address and there are no tokens: make one with `ischiad token "
+          "create`, or give --behind-proxy when a reverse proxy does access control",
+          s->config.listen);
+    return ISCHIA_OK;
+}
+
+/* ------------------------------------------------------------------ what workers tell */
+
+static void on_note(void *context, const struct pool_note *note)
+{
+    static const enum log_level levels[POOL_NOTE_KIND_COUNT] = {
+        [POOL_NOTE_STARTED] = LOG_LEVEL_DEBUG, [POOL_NOTE_READY] = LOG_LEVEL_INFO,
+        [POOL_NOTE_ENDED] = LOG_LEVEL_INFO,    [POOL_NOTE_DIED] = LOG_LEVEL_WARNING,
+        [POOL_NOTE_FAILED] = LOG_LEVEL_ERROR,
+    };
+    static const char *const words[POOL_NOTE_KIND_COUNT] = {
+        [POOL_NOTE_STARTED] = "worker started",       [POOL_NOTE_READY] = "worker ready",
+        [POOL_NOTE_ENDED] = "worker ended",           [POOL_NOTE_DIED] = "worker died",
+        [POOL_NOTE_FAILED] = "worker cannot be used",
+    };
+    struct log_value detail;
+    (void)context;
+    if (note->kind == POOL_NOTE_STARTED) metrics_count(METRIC_WORKER_STARTS);
+    log_event(levels[note->kind], words[note->kind], "worker=%d pid=%d detail=%s", note->worker,
+              note->pid, log_quote(&detail, note->detail));
+}
+
+static void on_finished(void *context, const struct uuid *id, enum queue_state state,
+                        enum pool_end end, int64_t wall_ms, const char *detail)
+{
+    static const enum metric_outcome outcomes[QUEUE_STATE_COUNT] = {
+        [QUEUE_SUCCEEDED] = OUTCOME_SUCCEEDED,
+        [QUEUE_FAILED] = OUTCOME_FAILED,
+        [QUEUE_CANCELLED] = OUTCOME_CANCELLED,
+    };
+    char text[UUID_TEXT_BYTES];
+    struct log_value quoted;
+    (void)context;
+    uuid_format(id, text);
+    if (queue_is_final(state)) metrics_solve(outcomes[state], (double)wall_ms / 1e3);
+    LOG_INFO("assessment ended", "id=%s status=%s end=%s wall_ms=%lld detail=%s", text,
+             queue_state_names[state], pool_end_names[end], (long long)wall_ms,
+             log_quote(&quoted, detail == NULL ? "" : detail));
+}
+
+static void on_store_error(void *context, const struct ischia_error *err)
+{
+    struct log_value message;
+    (void)context;
+    LOG_ERROR("the store refuses", "detail=%s", log_quote(&message, err->message));
+}
+
+static enum ischia_code start_queue(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    const char *const command[] = {d->worker_program, "worker", NULL};
+    const struct queue_options options = {
+        .pool = {.command = command,
+                 .solve_workers = config->workers,
+                 .memory_max_bytes = (size_t)config->worker_memory_mib << 20,
+                 .solve_deadline_ms = config->worker_time_s * 1000},
+        .queued_max = config->queue_limit,
+    };
+    const struct queue_watcher watcher = {d, on_note, on_finished, on_store_error};
+    return queue_create(d->service.store, d->service.events, &options, &watcher, &d->service.queue,
+                        err);
+}
+
+static int http_thread_count(const struct config *config)
+{
+    enum { MOST = 8 };
+    if (config->http_threads > 0) return config->http_threads;
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return cores < 1 ? 1 : cores > MOST ? MOST : (int)cores;
+}
+
+static enum ischia_code start_http(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    const struct http_options options = {
+        .listen = config->listen,
+        .threads = http_thread_count(config),
+        .connections = config->connections,
+        .connections_per_address = config->connections_per_address,
+        .idle_timeout_s = config->idle_timeout_s,
+        .request_timeout_s = config->request_timeout_s,
+        .tls_certificate = d->tls_certificate,
+        .tls_key = d->tls_key,
+    };
+    const struct http_app app = service_app(&d->service);
+    return http_start(&d->service.http, &options, &app, err);
+}
+
+/* ------------------------------------------------------------------------------ loop */
+
+static void announce(const struct daemon *d)
+{
+    const char *scheme = d->tls_certificate == NULL ? "http" : "https";
+    (void)printf("listening on %s://%s\n", scheme, http_address(d->service.http));
+    (void)fflush(stdout);
+    LOG_INFO("listening", "address=%s://%s version=%s", scheme, http_address(d->service.http),
+             ISCHIA_VERSION);
+    (void)notify_manager("READY=1");
+}
+
+static void reload(struct daemon *d)
+{
+    struct config fresh;
+    struct ischia_error err;
+    char names[512];
+    struct log_value quoted;
+    (void)notify_reloading();
+    if (load_config(&fresh, d->arguments, &err) != ISCHIA_OK) {
+        LOG_ERROR("options not reloaded", "detail=%s", log_quote(&quoted, err.message));
+    } else {
+        const size_t others = config_reload(&d->service.config, &fresh, names, sizeof names);
+        service_apply(&d->service);
+        LOG_INFO("options reloaded", "need_restart=%s",
+                 log_quote(&quoted, others == 0 ? "" : names));
+    }
+    (void)notify_manager("READY=1");
+}
+
+/* Erases what the retention rule no longer keeps, a batch at a time so that nobody waits long. */
+static void retire(struct daemon *d)
+{
+    const struct config *config = &d->service.config;
+    const struct store_retention rule = {
+        .age_max_ms = (int64_t)config->retention_days * 24 * 3600 * 1000,
+        .count_max = config->retention_count,
+    };
+    struct ischia_error err;
+    int erased = 0;
+    if (store_retire(d->service.store, &rule, RETIRE_BATCH, &erased, &err) != ISCHIA_OK)
+        on_store_error(d, &err);
+    if (erased > 0) LOG_INFO("retention", "erased=%d", erased);
+    d->retire_at_ms = http_now_ms() + (erased == RETIRE_BATCH ? TICK_MS : RETIRE_EVERY_S * 1000);
+}
+
+static void tick(struct daemon *d)
+{
+    const int64_t now_ms = http_now_ms();
+    const int watchdog_ms = notify_watchdog_ms();
+    events_sweep(d->service.events, SWEEP_AGE_MS);
+    if (watchdog_ms > 0 && now_ms >= d->watchdog_at_ms) {
+        (void)notify_manager("WATCHDOG=1");
+        d->watchdog_at_ms = now_ms + watchdog_ms;
+    }
+    if (now_ms >= d->retire_at_ms) retire(d);
+}
+
+/* Waits at most a tick for a signal of `set`; 0: none came. */
+static int next_signal(const sigset_t *set)
+{
+    const struct timespec wait = {.tv_sec = TICK_MS / 1000, .tv_nsec = 0};
+    const int signal = sigtimedwait(set, NULL, &wait);
+    return signal < 0 ? 0 : signal;
+}
+
+static void run(struct daemon *d, const sigset_t *signals)
+{
+    for (;;) {
+        const int signal = next_signal(signals);
+        if (signal == SIGTERM || signal == SIGINT) {
+            LOG_INFO("stopping", "signal=%d", signal);
+            return;
+        }
+        if (signal == SIGHUP) reload(d);
+        tick(d);
+    }
+}
+
+/* Takes nothing new, and gives running solves their time; a second signal ends that. */
+static void drain(struct daemon *d, const sigset_t *signals)
+{
+    const int64_t until_ms = http_now_ms() + (int64_t)d->service.config.drain_timeout_s * 1000;
+    struct pool_stats stats;
+    (void)notify_manager("STOPPING=1");
+    atomic_store(&d->service.draining, true);
+    queue_drain(d->service.queue);
+    for (;;) {
+        const struct timespec wait = {.tv_sec = 0, .tv_nsec = 50 * 1000 * 1000};
+        pool_stats(queue_pool(d->service.queue), &stats);
+        if (stats.busy == 0 || http_now_ms() >= until_ms) return;
+        const int signal = sigtimedwait(signals, NULL, &wait);
+        if (signal == SIGTERM || signal == SIGINT) return;
+    }
+}
+
+static enum ischia_code start(struct daemon *d, struct ischia_error *err)
+{
+    raise_descriptor_limit();
+    find_worker(d);
+    TRY(load_tls(d, err));
+    TRY(enter_state_dir(d, err));
+    TRY(open_store(d, err));
+    TRY(create_parts(d, err));
+    service_apply(&d->service);
+    TRY(check_access(d, err));
+    TRY(start_queue(d, err));
+    return start_http(d, err);
+}
+
+/* The mirror of start; every part may be missing. Requests end first, then solves, then the store,
+ * whose thread may still be about to wake a request: their memory goes last. */
+static void finish(struct daemon *d)
+{
+    struct service *s = &d->service;
+    http_stop(s->http);
+    queue_destroy(s->queue, 0);
+    store_close(s->store);
+    http_destroy(s->http);
+    events_destroy(s->events);
+    documents_destroy(s->documents);
+    rate_destroy(s->rate);
+    audit_destroy(s->audit);
+    auth_destroy(s->auth);
+    free(d->tls_certificate);
+    free(d->tls_key);
+}
+
+static int complain(const struct ischia_error *err)
+{
+    (void)fprintf(stderr, "ischiad: %s\n", err->message);
+    return err->code == ISCHIA_E_INPUT ? EXIT_USAGE : EXIT_FAILURE;
+}
+
+static int serve(const struct config *config, struct arguments *arguments)
+{
+    struct daemon *d = calloc(1, sizeof *d);
+    struct ischia_error err = {.code = ISCHIA_E_MEMORY, .message = "no memory to start"};
+    sigset_t signals;
+    if (d == NULL) return complain(&err);
+    d->arguments = arguments;
+    d->service.config = *config;
+    /* Blocked in every thread from the start: run and drain ask for them. */
+    (void)sigemptyset(&signals);
+    (void)sigaddset(&signals, SIGTERM);
+    (void)sigaddset(&signals, SIGINT);
+    (void)sigaddset(&signals, SIGHUP);
+    (void)pthread_sigmask(SIG_BLOCK, &signals, NULL);
+    (void)signal(SIGPIPE, SIG_IGN);
+    const enum ischia_code code = start(d, &err);
+    if (code == ISCHIA_OK) {
+        announce(d);
+        run(d, &signals);
+        drain(d, &signals);
+    }
+    finish(d);
+    LOG_INFO("stopped", "");
+    log_finish();
+    free(d);
+    return code == ISCHIA_OK ? EXIT_SUCCESS : complain(&err);
+}
+
+/* ------------------------------------------------------------------------------ main */
+
+static int print_help(void)
+{
+    (void)printf("Usage: ischiad [OPTIONS]            serves until SIGTERM\n"
+                 "       ischiad [OPTIONS] COMMAND    administers the store\n\n"
+                 "Commands:\n%s\nOptions (also NAME = VALUE in the file, ISCHIA_NAME in the "
+                 "environment):\n  --config FILE\n      Reads options from a file.\n",
+                 admin_help);
+    config_print_help(stdout);
+    (void)printf("  --check-config, --print-config, --print-man, --print-routes, --help, "
+                 "--version\n");
+    return EXIT_SUCCESS;
+}
+
+/* What can be said about the options without starting. */
+static int check(const struct config *config)
+{
+    struct daemon d = {.service = {.config = *config}};
+    struct ischia_error err;
+    bool loopback = false;
+    enum ischia_code code = load_tls(&d, &err);
+    if (code == ISCHIA_OK) code = listen_is_loopback(config->listen, &loopback, &err);
+    if (code == ISCHIA_OK && !loopback && !config->behind_proxy && d.tls_certificate == NULL)
+        code = FAIL(&err, ISCHIA_E_INPUT,
+                    "%s is not a loopback address: set tls_certificate and tls_key, or "
+                    "behind_proxy",
+                    config->listen);
+    free(d.tls_certificate);
+    free(d.tls_key);
+    if (code != ISCHIA_OK) return complain(&err);
+    (void)printf("The options are good.\n");
+    return EXIT_SUCCESS;
+}
+
+static int act(const struct config *config, struct arguments *arguments)
+{
+    switch (arguments->action) {
+    case ACT_CHECK:
+        return check(config);
+    case ACT_PRINT:
+        config_print(config, stdout);
+        return EXIT_SUCCESS;
+    case ACT_MAN:
+        config_print_man(stdout);
+        return EXIT_SUCCESS;
+    case ACT_ROUTES:
+        routes_print(stdout);
+        return EXIT_SUCCESS;
+    case ACT_HELP:
+        return print_help();
+    case ACT_VERSION:
+        (void)printf("ischiad %s\n", ISCHIA_VERSION);
+        return EXIT_SUCCESS;
+    case ACT_SERVE:
+        break;
+    }
+    if (arguments->word_count > 0)
+        return admin_run(config, arguments->words, arguments->word_count);
+    return serve(config, arguments);
+}
+
+int main(int argc, char **argv)
+{
+    struct arguments arguments = {.action = ACT_SERVE};
+    struct config config;
+    struct ischia_error err;
+    log_init(LOG_LEVEL_INFO);
+    enum ischia_code code = parse_arguments(&arguments, argc, argv, &err);
+    if (code == ISCHIA_OK) code = load_config(&config, &arguments, &err);
+    const int status = code == ISCHIA_OK ? act(&config, &arguments) : complain(&err);
+    free(arguments.flags);
+    return status;
+}

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Bundles the clinic page into dist/: index.html, assets/app.js, assets/app.css and, as a file of
+// its own that is fetched only when somebody opens the 3-D view, assets/view3d.js. The names carry
+// no hash: the daemon serves them with an ETag, so a browser asks once and keeps what it has.
+import { build } from 'esbuild';
+import { cp, mkdir, readdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { gzipSync } from 'node:zlib';
+
+const here = dirname(fileURLToPath(import.meta.url));
+const dist = join(here, 'dist');
+const first_page_limit = 100 * 1024;
+
+const exists = (path) =>
+  stat(path).then(
+    () => true,
+    () => false,
+  );
+
+/* `table2:inputs` is examples/table2.csv as text; `table2:results` is what `make-reference.mjs`
+ * made of it with `ischia cohort`, or null while nobody has run it: then no strip plot is shown. */
+const table2 = {
+  name: 'table2',
+  setup(bundle) {
+    const files = {
+      'table2:inputs': { path: join(here, '../examples/table2.csv'), loader: 'text', absent: '' },
+      'table2:results': {
+        path: join(here, 'reference/table2.json'),
+        loader: 'json',
+        absent: 'null',
+      },
+    };
+    bundle.onResolve({ filter: /^table2:/ }, (a) => ({ path: a.path, namespace: 'table2' }));
+    bundle.onLoad({ filter: /.*/, namespace: 'table2' }, async (a) => {
+      const { path, loader, absent } = files[a.path];
+      return { contents: (await exists(path)) ? await readFile(path, 'utf8') : absent, loader };
+    });
+  },
+};
+
+const common = {
+  bundle: true,
+  minify: true,
+  format: 'esm',
+  target: ['es2022', 'chrome109', 'firefox115', 'safari16.4'],
+  jsx: 'automatic',
+  jsxImportSource: 'preact',
+  legalComments: 'none' /* licences.txt has them whole */,
+  metafile: true,
+  logLevel: 'warning',
+  plugins: [table2],
+};
+
+async function first_page_bytes() {
+  const files = ['index.html', 'assets/app.js', 'assets/app.css', 'assets/icon.svg'];
+  const sizes = await Promise.all(
+    files.map(async (f) => gzipSync(await readFile(join(dist, f)), { level: 9 }).length),
+  );
+  return sizes.reduce((a, b) => a + b, 0);
+}
+
+/* The licence texts of the packages that ended up in a bundle: their terms ask for that. */
+async function write_licences(metafiles) {
+  const inputs = metafiles.flatMap((m) => Object.keys(m.inputs));
+  const names = new Set(
+    inputs.flatMap((path) => /node_modules\/((?:@[^/]+\/)?[^/]+)/.exec(path)?.[1] ?? []),
+  );
+  const texts = [];
+  for (const name of [...names].sort()) {
+    const folder = join(here, 'node_modules', name);
+    const { version, license } = JSON.parse(await readFile(join(folder, 'package.json'), 'utf8'));
+    const file = (await readdir(folder)).find((f) => /^licen[cs]e/i.test(f));
+    const text = file ? await readFile(join(folder, file), 'utf8') : `Licence: ${license}\n`;
+    texts.push(`${name} ${version} (${license})\n\n${text.trim()}\n`);
+  }
+  await writeFile(join(dist, 'assets/licences.txt'), texts.join(`\n${'-'.repeat(78)}\n\n`));
+}
+
+const bundle = async (entry, out) =>
+  (await build({ ...common, entryPoints: [join(here, entry)], outfile: join(dist, out) })).metafile;
+
+await rm(dist, { recursive: true, force: true });
+await mkdir(join(dist, 'assets'), { recursive: true });
+await write_licences([
+  await bundle('src/main.tsx', 'assets/app.js'),
+  await bundle('src/style/app.css', 'assets/app.css'),
+  await bundle('src/view3d/scene.ts', 'assets/view3d.js'),
+]);
+await cp(join(here, 'public/icon.svg'), join(dist, 'assets/icon.svg'));
+await writeFile(join(dist, 'index.html'), await readFile(join(here, 'index.html')));
+
+const bytes = await first_page_bytes();
+console.log(
+  `first page: ${(bytes / 1024).toFixed(1)} KB compressed (limit ${first_page_limit / 1024})`,
+);
+if (bytes > first_page_limit) {
+  console.error(
+    'The first page is too large: move what it does not need at once out of src/main.tsx.',
+  );
+  process.exit(1);
+}

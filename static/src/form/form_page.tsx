@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The form: a person, two sides, one button.
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { get_parameters, type Parameters } from '../api.js';
+import { t } from '../i18n.js';
+import type { Side } from '../types.js';
+import { field_id } from './field.js';
+import { sides } from './model.js';
+import { PersonFields } from './person.js';
+import { Resolution } from './resolution.js';
+import { SideForm } from './side_form.js';
+import { use_form, type Failure } from './use_form.js';
+
+function focus_field(e: Event, id: string): void {
+  e.preventDefault();
+  document.getElementById(id)?.focus();
+}
+
+function Errors(props: { failure: Failure }) {
+  const box = useRef<HTMLDivElement>(null);
+  const { text, fields } = props.failure;
+  useEffect(() => box.current?.focus(), [props.failure]);
+  return (
+    <div class="errors" role="alert" tabIndex={-1} ref={box}>
+      <p>{text}</p>
+      {fields.length > 0 && (
+        <ul>
+          {fields.map(({ side, key, text: fault }) => (
+            <li key={side + key}>
+              <a
+                href={`#${field_id(side, key)}`}
+                onClick={(e) => focus_field(e, field_id(side, key))}
+              >
+                {`${t(`side.${side}`)}, ${key}`}
+              </a>
+              {`: ${fault}`}
+            </li>
+          ))}
+        </ul>
+      )}
+    </div>
+  );
+}
+
+function use_parameters(): [Parameters | null, boolean, () => void] {
+  const [parameters, set] = useState<Parameters | null>(null);
+  const [failed, set_failed] = useState(false);
+  const load = (): void => {
+    set_failed(false);
+    get_parameters().then(set, () => set_failed(true));
+  };
+  useEffect(load, []);
+  return [parameters, failed, load];
+}
+
+function Loading(props: { failed: boolean; again: () => void }) {
+  return (
+    <>
+      <h1 tabIndex={-1}>{t('form.title')}</h1>
+      {props.failed ? (
+        <div class="errors" role="alert">
+          <p>{t('form.loading.failed')}</p>
+          <button type="button" onClick={props.again}>
+            {t('form.retry')}
+          </button>
+        </div>
+      ) : (
+        <p class="loading">{t('form.loading')}</p>
+      )}
+    </>
+  );
+}
+
+function submit_label(filled: Side[]): string {
+  if (filled.length === 2) return t('form.submit.both');
+  return filled[0] ? t(`form.submit.${filled[0]}`) : t('form.submit.none');
+}
+
+export function FormPage(props: { from: string[] }) {
+  const [parameters, failed, again] = use_parameters();
+  const form = use_form(parameters, props.from);
+  if (!parameters) return <Loading failed={failed} again={again} />;
+  const { person, entries, failure, sending } = form;
+  const send = (e: Event): void => {
+    e.preventDefault();
+    void form.send();
+  };
+  return (
+    <form class="assessment" onSubmit={send} noValidate>
+      <h1 tabIndex={-1}>{t('form.title')}</h1>
+      <PersonFields person={person} on_change={form.set_person} on_sample={form.fill_sample} />
+      {failure && <Errors failure={failure} />}
+      <div class="sides">
+        {sides.map((side) => (
+          <SideForm
+            key={side}
+            side={side}
+            entry={entries[side]}
+            parameters={parameters}
+            refused={form.refused[side]}
+            on_change={(entry, key) => form.change_side(side, entry, key)}
+            on_copy={() => form.copy_stiffness(side)}
+          />
+        ))}
+      </div>
+      <div class="submit">
+        <button type="submit" class="primary" aria-disabled={sending}>
+          {sending ? t('form.submitting') : submit_label(form.filled)}
+        </button>
+        <button type="button" class="quiet" onClick={form.clear}>
+          {t('form.clear')}
+        </button>
+        <span class="hint">{t('form.partial')}</span>
+        <Resolution
+          names={parameters.resolutions}
+          value={person.resolution}
+          change={(resolution) => form.set_person({ ...person, resolution })}
+        />
+      </div>
+    </form>
+  );
+}

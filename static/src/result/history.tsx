@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Other assessments of the same subject, over time: a small chart and the same in a table.
+import { useEffect, useState } from 'preact/hooks';
+import { list } from '../api.js';
+import { has_ended } from '../follow.js';
+import { format_fixed, format_time, t } from '../i18n.js';
+import { result_address } from '../router.js';
+import type { Assessment } from '../types.js';
+import { Link, Outcome, side_letter, side_name } from '../ui.js';
+import { ticks } from './axis.js';
+import { finished, type Finished } from './quantities.js';
+
+const size = { width: 460, height: 120, left: 36, right: 20, top: 12, foot: 22 };
+const day_ms = 24 * 3600 * 1000; /* two sides of one visit make no history */
+const time_of = (d: Assessment): string => d.measured_at ?? d.created_at;
+
+/* Read again whenever one more of the assessments shown has ended. */
+function use_history(subject: string | null, ended: number): Assessment[] | null {
+  const [items, set] = useState<Assessment[] | null>(null);
+  useEffect(() => {
+    if (!subject) return set(null);
+    let wanted = true;
+    list({ subject, limit: 100 }).then(
+      (page) => wanted && set(page.items),
+      () => wanted && set([]) /* the history is an extra: the result stands without it */,
+    );
+    return () => {
+      wanted = false;
+    };
+  }, [subject, ended]);
+  return items;
+}
+
+function Mark(props: { x: number; y: number; of: Finished; current: boolean }) {
+  const { x, y, of, current } = props;
+  const shape =
+    of.side === 'right'
+      ? `M${x - 5} ${y - 5}h10v10h-10z`
+      : `M${x - 5} ${y}a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z`;
+  return (
+    <g class={`mark ${of.side ?? ''} ${current ? 'current' : ''}`}>
+      <path d={shape} />
+      <text x={x} y={y - 8} text-anchor="middle">
+        {side_letter(of.side)}
+      </text>
+    </g>
+  );
+}
+
+function Chart(props: { items: Finished[]; current: string[] }) {
+  const { items, current } = props;
+  const times = items.map((d) => Date.parse(time_of(d)));
+  const [first, last] = [Math.min(...times), Math.max(...times)];
+  if (items.length < 2 || last - first < day_ms) return null;
+  const max = Math.max(...items.map((d) => d.result.strain.eps_max)) * 1.15;
+  const bottom = size.height - size.foot;
+  const x = (time: number): number =>
+    size.left + 10 + ((time - first) / (last - first)) * (size.width - size.left - size.right - 20);
+  const y = (v: number): number => bottom - (v / max) * (bottom - size.top);
+  return (
+    <svg
+      class="history"
+      viewBox={`0 0 ${size.width} ${size.height}`}
+      role="img"
+      aria-label={t('history.alt')}
+    >
+      {ticks(max, 3).map((v) => (
+        <g key={v}>
+          <path class="grid" d={`M${size.left} ${y(v)}H${size.width - size.right}`} />
+          <text class="tick" x={size.left - 5} y={y(v) + 4} text-anchor="end">
+            {format_fixed(v, 1)}
+          </text>
+        </g>
+      ))}
+      {items.map((d, i) => (
+        <Mark
+          key={d.id}
+          x={x(times[i] ?? 0)}
+          y={y(d.result.strain.eps_max)}
+          of={d}
+          current={current.includes(d.id)}
+        />
+      ))}
+      <text class="tick" x={size.left} y={size.height - 4}>
+        {format_time(new Date(first).toISOString().slice(0, 10))}
+      </text>
+      <text class="tick" x={size.width - size.right} y={size.height - 4} text-anchor="end">
+        {format_time(new Date(last).toISOString().slice(0, 10))}
+      </text>
+    </svg>
+  );
+}
+
+function Row(props: { of: Assessment; current: boolean }) {
+  const { of, current } = props;
+  return (
+    <tr class={current ? 'ours' : ''}>
+      <th scope="row">
+        {current ? (
+          `${format_time(time_of(of))} (${t('history.this')})`
+        ) : (
+          <Link to={result_address([of.id])}>{format_time(time_of(of))}</Link>
+        )}
+      </th>
+      <td class="text">{side_name(of.side)}</td>
+      <td class="text">
+        <Outcome of={of} />
+      </td>
+      <td>{of.result?.strain ? format_fixed(of.result.strain.eps_max, 3) : '–'}</td>
+    </tr>
+  );
+}
+
+export function History(props: { documents: Assessment[] }) {
+  const [first, second] = props.documents;
+  const subject =
+    first?.subject && (!second || second.subject === first.subject) ? first.subject : null;
+  const items = use_history(subject, props.documents.filter(has_ended).length);
+  if (!subject || !items) return null;
+  const current = props.documents.map((d) => d.id);
+  const others = items.filter((d) => !current.includes(d.id));
+  return (
+    <section class="panel-box" aria-labelledby="history">
+      <h2 id="history">{t('history.title', { subject })}</h2>
+      {others.length === 0 ? (
+        <p class="hint">{t('history.none')}</p>
+      ) : (
+        <div class="beside-chart">
+          <Chart items={finished(items)} current={current} />
+          <div class="scroll" tabIndex={0} role="group" aria-labelledby="history">
+            <table class="numbers small">
+              <thead>
+                <tr>
+                  <th scope="col">{t('history.when')}</th>
+                  <th scope="col" class="text">
+                    {t('list.side')}
+                  </th>
+                  <th scope="col" class="text">
+                    {t('list.col.outcome')}
+                  </th>
+                  <th scope="col">{t('list.col.eps')}</th>
+                </tr>
+              </thead>
+              <tbody>
+                {items.map((d) => (
+                  <Row key={d.id} of={d} current={current.includes(d.id)} />
+                ))}
+              </tbody>
+            </table>
+          </div>
+        </div>
+      )}
+    </section>
+  );
+}

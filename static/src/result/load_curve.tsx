@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Strain in the muscle against the force on this side: two panels on one force axis, each with its
+// threshold and the force at which the path first crosses it. The same numbers stand in a table.
+import { format, format_fixed, t } from '../i18n.js';
+import type { LoadPoint, Result } from '../types.js';
+import { ticks } from './axis.js';
+import type { Finished } from './quantities.js';
+
+const width = 340;
+const plot = { left: 32, right: 8, height: 78, gap: 30, top: 18, foot: 34 };
+
+interface Panel {
+  name: string;
+  class: string;
+  of: (p: LoadPoint) => number;
+  threshold: number;
+  crossed: number | null;
+}
+
+function panels(r: Result): Panel[] {
+  const { shear, compression } = r.clusters;
+  return [
+    {
+      name: t('curve.shear'),
+      class: 'shear',
+      of: (p) => p.E_shear_max,
+      threshold: shear.threshold ?? 0,
+      crossed: r.threshold_force_N.shear,
+    },
+    {
+      name: t('curve.compression'),
+      class: 'compression',
+      of: (p) => p.E_comp_max,
+      threshold: compression.threshold ?? 0,
+      crossed: r.threshold_force_N.compression,
+    },
+  ];
+}
+
+const panel_top = (i: number): number => plot.top + i * (plot.height + plot.gap);
+
+function PanelPlot(props: {
+  panel: Panel;
+  points: LoadPoint[];
+  index: number;
+  x: (F: number) => number;
+}) {
+  const { panel, points, index, x } = props;
+  const max = Math.max(panel.threshold * 1.2, ...points.map(panel.of)) * 1.05;
+  const top = panel_top(index);
+  const bottom = top + plot.height;
+  const y = (v: number): number => bottom - (v / max) * plot.height;
+  const line = points.map((p, i) => `${i ? 'L' : 'M'}${x(p.F_N)} ${y(panel.of(p))}`).join('');
+  const y_threshold = y(panel.threshold);
+  const ends_above = panel.of(points[points.length - 1] as LoadPoint) > panel.threshold;
+  const y_label = y_threshold + (ends_above ? 12 : -5); /* the side that the line leaves free */
+  const latest = 0.8 * (points[points.length - 1]?.F_N ?? 0); /* a label after it would not fit */
+  return (
+    <g class={`panel ${panel.class}`}>
+      <text class="name" x={plot.left} y={top - 6}>
+        {panel.name}
+      </text>
+      {ticks(max, 3).map((v) => (
+        <g key={v}>
+          <path class="grid" d={`M${plot.left} ${y(v)}H${width - plot.right}`} />
+          <text class="tick" x={plot.left - 5} y={y(v) + 4} text-anchor="end">
+            {format(v)}
+          </text>
+        </g>
+      ))}
+      <path class="threshold" d={`M${plot.left} ${y_threshold}H${width - plot.right}`} />
+      <text class="threshold" x={width - plot.right} y={y_label} text-anchor="end">
+        {t('curve.threshold', { value: panel.threshold })}
+      </text>
+      <path class="line" d={line} />
+      {panel.crossed !== null && (
+        <g class="crossed">
+          <path d={`M${x(panel.crossed)} ${y_threshold}V${bottom}`} />
+          <circle cx={x(panel.crossed)} cy={y_threshold} r="4" />
+          <text
+            x={x(panel.crossed) + (panel.crossed > latest ? -6 : 6)}
+            y={bottom - 5}
+            text-anchor={panel.crossed > latest ? 'end' : 'start'}
+          >
+            {t('curve.crossed', { force: format_fixed(panel.crossed, 0) })}
+          </text>
+        </g>
+      )}
+    </g>
+  );
+}
+
+function Table(props: { points: LoadPoint[] }) {
+  return (
+    <details open>
+      <summary>{t('curve.table')}</summary>
+      <div class="scroll" tabIndex={0} role="group" aria-label={t('curve.table')}>
+        <table class="numbers small">
+          <thead>
+            <tr>
+              <th scope="col">{t('curve.col.F')}</th>
+              <th scope="col">{t('curve.col.travel')}</th>
+              <th scope="col">{t('curve.col.eps')}</th>
+              <th scope="col">{t('curve.col.shear')}</th>
+              <th scope="col">{t('curve.col.comp')}</th>
+            </tr>
+          </thead>
+          <tbody>
+            {props.points.map((p) => (
+              <tr key={p.F_N}>
+                <td>{format_fixed(p.F_N, 1)}</td>
+                <td>{format_fixed(p.displacement_mm, 1)}</td>
+                <td>{format_fixed(p.eps_max, 3)}</td>
+                <td>{format_fixed(p.E_shear_max, 3)}</td>
+                <td>{format_fixed(p.E_comp_max, 3)}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+    </details>
+  );
+}
+
+export function LoadCurve(props: { of: Finished; side: string }) {
+  const { result, parameters } = props.of;
+  const points = result.load_curve;
+  if (points.length < 2) return null;
+  const F = parameters['F'] ?? points[points.length - 1]?.F_N ?? 1;
+  const x = (force: number): number => plot.left + (force / F) * (width - plot.left - plot.right);
+  const bottom = panel_top(1) + plot.height;
+  const height = bottom + plot.foot;
+  return (
+    <figure class="curve">
+      <figcaption>{t('curve.title')}</figcaption>
+      <svg
+        viewBox={`0 0 ${width} ${height}`}
+        role="img"
+        aria-label={t('curve.alt', { side: props.side })}
+      >
+        {panels(result).map((panel, i) => (
+          <PanelPlot key={panel.class} panel={panel} points={points} index={i} x={x} />
+        ))}
+        {ticks(F * 0.93, 4).map((force) => (
+          <text key={force} class="tick" x={x(force)} y={bottom + 14} text-anchor="middle">
+            {format(force)}
+          </text>
+        ))}
+        <text class="tick end" x={x(F)} y={bottom + 14} text-anchor="end">
+          {format(F)}
+        </text>
+        <text class="name" x={plot.left} y={bottom + 29}>
+          {t('curve.force')}
+        </text>
+        <text class="name" x={width - plot.right} y={bottom + 29} text-anchor="end">
+          {t('curve.measured', { F })}
+        </text>
+      </svg>
+      <Table points={points} />
+    </figure>
+  );
+}

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// One assessment, or two beside each other.
+import { useEffect, useRef, useState } from 'preact/hooks';
+import {
+  document_path,
+  field_path,
+  get_parameters,
+  report_path,
+  section_path,
+  type Parameters,
+} from '../api.js';
+import { Follower, has_ended, type Followed } from '../follow.js';
+import { format_time, t, t_or } from '../i18n.js';
+import { form_address } from '../router.js';
+import { Reports } from '../report/report.js';
+import type { Assessment } from '../types.js';
+import { announce, column_names, Link } from '../ui.js';
+import { Caveats } from './caveats.js';
+import { Glance } from './glance.js';
+import { History } from './history.js';
+import { LoadCurve } from './load_curve.js';
+import { Numbers } from './numbers.js';
+import { Picture } from './picture.js';
+import { finished } from './quantities.js';
+import { Strips } from './strip.js';
+import { NoResult, Running } from './waiting.js';
+
+const nothing_yet: Followed = { document: null, progress: null, lost: false, error: null };
+
+/* The state of every assessment, followed until it ends. */
+function use_followed(ids: string[]): [Followed[], (index: number) => void] {
+  const [states, set] = useState<Followed[]>(ids.map(() => nothing_yet));
+  const followers = useRef<Follower[]>([]);
+  useEffect(() => {
+    set(ids.map(() => nothing_yet));
+    followers.current = ids.map(
+      (id, i) =>
+        new Follower(id, (state) => set((now) => now.map((s, k) => (k === i ? state : s)))),
+    );
+    return () => followers.current.forEach((f) => f.stop());
+  }, [ids.join()]);
+  return [states, (index) => followers.current[index]?.refresh()];
+}
+
+function use_parameters(): Parameters | null {
+  const [parameters, set] = useState<Parameters | null>(null);
+  useEffect(() => {
+    get_parameters().then(set, () => undefined /* names and limits are then left out */);
+  }, []);
+  return parameters;
+}
+
+/* Says once, to a screen reader, how each side ended. */
+function use_announcement(states: Followed[], names: string[]): void {
+  const said = useRef(new Set<string>());
+  useEffect(() => {
+    states.forEach(({ document }, i) => {
+      if (!document || !has_ended(document) || said.current.has(document.id)) return;
+      said.current.add(document.id);
+      const band = document.result?.risk?.band;
+      const headline = band ? t(`band.${band}`) : t(`status.${document.status}`);
+      announce(t('result.done', { side: names[i] ?? '', headline }));
+    });
+  }, [states]);
+}
+
+function SideCard(props: {
+  state: Followed;
+  name: string;
+  skin_mm: number;
+  on_cancelled: () => void;
+}) {
+  const { state, name } = props;
+  const { document, error, lost } = state;
+  const done = document ? finished([document])[0] : undefined;
+  const busy = !error && (!document || !has_ended(document));
+  return (
+    <section class={`card ${document?.side ?? ''}`} aria-label={name}>
+      <header>
+        <h2>{name}</h2>
+        {document && <Meta of={document} />}
+      </header>
+      {lost && (
+        <p class="lost" role="status">
+          {t('result.lost')}
+        </p>
+      )}
+      {error && (
+        <p class="errors" role="alert">
+          {error.status === 404 ? t('result.not_found') : error.message}
+        </p>
+      )}
+      {busy && <Running state={state} name={name} on_cancelled={props.on_cancelled} />}
+      {document && has_ended(document) && !done && <NoResult of={document} />}
+      {done && (
+        <>
+          <Glance of={done} skin_mm={props.skin_mm} />
+          <div class="figures">
+            <Picture of={done} side={name} />
+            <LoadCurve of={done} side={name} />
+          </div>
+        </>
+      )}
+    </section>
+  );
+}
+
+function Meta(props: { of: Assessment }) {
+  const { of } = props;
+  const parts = [
+    of.subject ? t('result.subject', { subject: of.subject }) : '',
+    of.label ?? '',
+    of.measured_at ? t('result.measured', { time: format_time(of.measured_at) }) : '',
+    of.resolution && of.resolution !== 'standard'
+      ? `${t('form.resolution')}: ${t_or(`form.resolution.${of.resolution}`, of.resolution)}`
+      : '',
+    of.finished_at ? t('result.computed', { time: format_time(of.finished_at) }) : '',
+  ];
+  return <p class="hint">{parts.filter(Boolean).join(' · ')}</p>;
+}
+
+function Files(props: { documents: Assessment[]; names: string[] }) {
+  return (
+    <details class="files">
+      <summary>{t('result.more')}</summary>
+      {props.documents.map((d, i) => (
+        <p key={d.id}>
+          <span>{`${props.names[i]}: `}</span>
+          <a href={report_path(d.id)}>{t('result.file.report')}</a>
+          <a href={field_path(d.id)} download>
+            {t('result.file.field')}
+          </a>
+          <a href={section_path(d.id)} download>
+            {t('result.file.section')}
+          </a>
+          <a href={document_path(d.id)}>{t('result.file.document')}</a>
+        </p>
+      ))}
+    </details>
+  );
+}
+
+function page_title(documents: Assessment[]): string {
+  const [a, b] = documents;
+  if (!a || !b) return t('result.title');
+  const pair = a.side && b.side && a.side !== b.side && a.subject === b.subject;
+  return t(pair ? 'result.title.pair' : 'result.title.compare');
+}
+
+export function ResultPage(props: { ids: string[] }) {
+  const { ids } = props;
+  const [states, refresh] = use_followed(ids);
+  const parameters = use_parameters();
+  const documents = states.flatMap((s) => (s.document ? [s.document] : []));
+  const complete = documents.length === ids.length;
+  const names = complete ? column_names(documents) : ids.map(() => t('result.title'));
+  use_announcement(complete ? states : [], names);
+  const done = finished(documents);
+  const inputs = parameters?.inputs ?? [];
+  return (
+    <div class="result">
+      <div class="title-row">
+        <h1 tabIndex={-1}>{page_title(documents)}</h1>
+        {done.length > 0 && (
+          <div class="actions">
+            <Link to={form_address(ids)} class="button">
+              {t('result.again')}
+            </Link>
+            <button type="button" class="primary" onClick={() => window.print()}>
+              {t('result.print')}
+            </button>
+            <Files documents={done} names={column_names(done)} />
+          </div>
+        )}
+      </div>
+      <div class={`cards n${ids.length}`}>
+        {states.map((state, i) => (
+          <SideCard
+            key={ids[i]}
+            state={state}
+            name={names[i] ?? ''}
+            skin_mm={parameters?.skin_thickness_mm ?? 0}
+            on_cancelled={() => refresh(i)}
+          />
+        ))}
+      </div>
+      {done.length > 0 && <Caveats documents={done} inputs={inputs} />}
+      <div class="lower">
+        {done.length > 0 && <Numbers documents={done} inputs={inputs} />}
+        <div>
+          <Strips documents={done} />
+          {complete && <History documents={documents} />}
+        </div>
+      </div>
+      {parameters && <Reports documents={done} parameters={parameters} />}
+    </div>
+  );
+}

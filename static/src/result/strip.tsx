@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// These sides among the 26 of Table 2: a strip a quantity, every reference side a ring, ours a
+// labelled pointer; the same in numbers beside it.
+import { format, format_fixed, t, type Key } from '../i18n.js';
+import { comparable_sides, type ReferenceSide } from '../reference.js';
+import type { Result } from '../types.js';
+import { column_letters, column_names, side_letter } from '../ui.js';
+import { ticks } from './axis.js';
+import type { Finished } from './quantities.js';
+
+interface Metric {
+  key: Key;
+  decimals: number;
+  of_reference: (s: ReferenceSide) => number;
+  of_result: (r: Result) => number;
+}
+
+const metrics: readonly Metric[] = [
+  {
+    key: 'strip.eps',
+    decimals: 2,
+    of_reference: (s) => s.eps_max,
+    of_result: (r) => r.strain.eps_max,
+  },
+  {
+    key: 'strip.v_shear',
+    decimals: 0,
+    of_reference: (s) => s.volume_shear_mm3,
+    of_result: (r) => r.clusters.shear.volume_mm3,
+  },
+  {
+    key: 'strip.v_both',
+    decimals: 0,
+    of_reference: (s) => s.volume_both_mm3,
+    of_result: (r) => r.clusters.both.volume_mm3,
+  },
+];
+
+const width = 460;
+const margin = 14;
+const line_y = 40;
+
+function Strip(props: { metric: Metric; reference: number[]; ours: number[]; letters: string[] }) {
+  const { metric, reference, ours, letters } = props;
+  const max = Math.max(...reference, ...ours) * 1.04 || 1;
+  const x = (v: number): number => margin + (v / max) * (width - 2 * margin);
+  const label = t('strip.alt', { metric: t(metric.key), n: reference.length });
+  return (
+    <svg class="strip" viewBox={`0 0 ${width} 66`} role="img" aria-label={label}>
+      <path class="axis" d={`M${margin} ${line_y}H${width - margin}`} />
+      {ticks(max, 5).map((v) => (
+        <g key={v}>
+          <path class="axis" d={`M${x(v)} ${line_y + 8}v4`} />
+          <text class="tick" x={x(v)} y={line_y + 24} text-anchor="middle">
+            {format(v)}
+          </text>
+        </g>
+      ))}
+      {reference.map((v, i) => (
+        <circle key={i} class="reference" cx={x(v)} cy={line_y} r="4.5" />
+      ))}
+      {ours.map((v, i) => (
+        <g key={i} class={`ours n${i}`}>
+          <path d={`M${x(v)} ${line_y - 6}l-6 -10h12z`} />
+          <text x={x(v)} y={line_y - 20} text-anchor={i ? 'start' : 'end'} dx={i ? 1 : -1}>
+            {letters[i]}
+          </text>
+        </g>
+      ))}
+    </svg>
+  );
+}
+
+const median = (sorted: number[]): number => {
+  const half = sorted.length / 2;
+  const [a = 0, b = 0] = [sorted[Math.ceil(half) - 1], sorted[Math.floor(half)]];
+  return (a + b) / 2;
+};
+
+function Row(props: { metric: Metric; sides: ReferenceSide[]; documents: Finished[] }) {
+  const { metric, sides, documents } = props;
+  const reference = sides.map(metric.of_reference);
+  const sorted = [...reference].sort((a, b) => a - b);
+  const ours = documents.map((d) => metric.of_result(d.result));
+  const number = (v: number): string => format_fixed(v, metric.decimals);
+  const names = column_names(documents);
+  return (
+    <div class="strip-row">
+      <h3>{t(metric.key)}</h3>
+      <Strip
+        metric={metric}
+        reference={reference}
+        ours={ours}
+        letters={column_letters(documents)}
+      />
+      <table class="numbers small">
+        <thead>
+          <tr>
+            <td />
+            <th scope="col">{t(metric.key)}</th>
+            <th scope="col">{t('strip.rank')}</th>
+          </tr>
+        </thead>
+        <tbody>
+          {ours.map((v, i) => (
+            <tr key={i} class="ours">
+              <th scope="row">{names[i]}</th>
+              <td>{number(v)}</td>
+              <td>
+                {t('strip.rank.of', {
+                  below: reference.filter((r) => r < v).length,
+                  n: sides.length,
+                })}
+              </td>
+            </tr>
+          ))}
+          <tr>
+            <th scope="row">{`${t('strip.low')} · ${t('strip.median')} · ${t('strip.high')}`}</th>
+            <td colSpan={2}>
+              {[sorted[0] ?? 0, median(sorted), sorted[sorted.length - 1] ?? 0]
+                .map(number)
+                .join(' · ')}
+            </td>
+          </tr>
+        </tbody>
+      </table>
+    </div>
+  );
+}
+
+function All(props: { sides: ReferenceSide[] }) {
+  return (
+    <details>
+      <summary>{t('strip.all')}</summary>
+      <table class="numbers small">
+        <thead>
+          <tr>
+            <th scope="col">{t('strip.side')}</th>
+            {metrics.map((m) => (
+              <th scope="col" key={m.key}>
+                {t(m.key)}
+              </th>
+            ))}
+          </tr>
+        </thead>
+        <tbody>
+          {props.sides.map((s) => (
+            <tr key={s.subject + s.side}>
+              <th scope="row">{`${s.subject} ${side_letter(s.side)}`}</th>
+              {metrics.map((m) => (
+                <td key={m.key}>{format_fixed(m.of_reference(s), m.decimals)}</td>
+              ))}
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </details>
+  );
+}
+
+export function Strips(props: { documents: Finished[] }) {
+  const sides = comparable_sides(props.documents);
+  if (sides.length === 0 || props.documents.length === 0) return null;
+  return (
+    <section class="panel-box strips" aria-labelledby="strips">
+      <h2 id="strips">{t('strip.title', { n: sides.length })}</h2>
+      <p class="hint">{t('strip.note')}</p>
+      {metrics.map((metric) => (
+        <Row key={metric.key} metric={metric} sides={sides} documents={props.documents} />
+      ))}
+      <All sides={sides} />
+    </section>
+  );
+}

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The documents of the HTTP contract, as far as this page reads them.
+
+export type Side = 'left' | 'right';
+export type Status = 'queued' | 'running' | 'succeeded' | 'failed' | 'cancelled';
+export type Band = 'below' | 'shear' | 'compression' | 'both';
+
+export interface Range {
+  min: number;
+  max: number;
+}
+
+export interface ParameterInfo {
+  key: string;
+  unit: string;
+  description: string;
+  accepted: Range;
+  studied: Range;
+}
+
+export interface Cluster {
+  volume_mm3: number;
+  eps_max: number;
+  E_shear_max: number;
+  E_comp_max: number;
+  centroid_mm: [number, number, number];
+}
+
+export interface ClusterSet {
+  threshold?: number;
+  volume_mm3: number;
+  count: number;
+  largest: Cluster | null;
+}
+
+export interface LoadPoint {
+  F_N: number;
+  displacement_mm: number;
+  eps_max: number;
+  E_shear_max: number;
+  E_comp_max: number;
+}
+
+export interface Result {
+  strain: { eps_max: number; eps_max_depth_mm: number; E_shear_max: number; E_comp_max: number };
+  clusters: { shear: ClusterSet; compression: ClusterSet; both: ClusterSet };
+  muscle_volume_mm3?: number;
+  seat: {
+    displacement_mm: number;
+    contact_area_mm2: number;
+    mean_pressure_kPa: number;
+    peak_pressure_kPa: number;
+  };
+  load_curve: LoadPoint[];
+  threshold_force_N: { shear: number | null; compression: number | null };
+  risk: { band: Band; headline: string; reasons: string[]; caveats: string[] };
+  numerics: {
+    converged: boolean;
+    elements: number;
+    dof: number;
+    load_steps: number;
+    newton_iterations: number;
+    force_residual: number;
+    energy_residual: number;
+    eps_max_error: number;
+    wall_s: number;
+    cpu_s: number;
+  };
+  model: { name: string; version: number };
+}
+
+export interface FieldError {
+  pointer: string;
+  code: string;
+  detail: string;
+}
+
+export interface Problem {
+  type?: string;
+  title?: string;
+  status?: number;
+  detail?: string;
+  errors?: FieldError[];
+}
+
+export interface Assessment {
+  id: string;
+  status: Status;
+  created_at: string;
+  started_at?: string | null;
+  finished_at?: string | null;
+  subject?: string | null;
+  side?: Side | null;
+  label?: string | null;
+  measured_at?: string | null;
+  resolution?: string;
+  skin?: { mu: number; thickness: number } | null;
+  parameters: Record<string, number>;
+  progress: number;
+  result?: Result | null;
+  problem?: Problem | null;
+  warnings?: FieldError[];
+}
+
+export interface ProgressEvent {
+  fraction: number;
+  load_step?: number;
+  newton_iteration?: number;
+  message?: string;
+}

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A running ischiad for a test: its own state directory, a free port, a fake worker."""
+import http.client
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+PROGRAM = os.environ.get('ISCHIAD', os.path.join(HERE, '../../build/server/ischiad'))
+FAKE_WORKER = os.path.join(HERE, 'fake_worker.py')
+JSON = {'Content-Type': 'application/json'}
+SIDE = {'R1': 7.1, 'R2': 22.8, 'eM': 31, 'eF': 10, 'muM': 8, 'muF': 5, 'F': 258}
+
+
+def side(**changes):
+    """The example side with changes; None leaves a key out."""
+    return {k: v for k, v in {**SIDE, **changes}.items() if v is not None}
+
+
+class Answer:
+    def __init__(self, response, body):
+        self.status = response.status
+        self.headers = response.headers
+        self.body = body
+
+    @property
+    def type(self):
+        return (self.headers.get('Content-Type') or '').split(';')[0]
+
+    def json(self):
+        return json.loads(self.body)
+
+
+def admin(state, *words, check=True):
+    """Runs an administration command; returns its standard output."""
+    done = subprocess.run(
+        [PROGRAM, '--state-dir', state, *words], capture_output=True, text=True, timeout=60
+    )
+    if check and done.returncode != 0:
+        raise AssertionError(f'{words}: {done.returncode}: {done.stderr}')
+    return done.stdout if check else done
+
+
+class Service:
+    def __init__(self, *options, state=None, worker=FAKE_WORKER, listen='127.0.0.1:0', env=None):
+        self.own_state = state is None
+        self.state = state or tempfile.mkdtemp(prefix='ischia-test-')
+        self.log = open(os.path.join(self.state, 'stderr.txt'), 'ab')
+        self.process = subprocess.Popen(
+            [
+                PROGRAM,
+                '--listen',
+                listen,
+                '--state-dir',
+                self.state,
+                '--worker-program',
+                worker,
+                '--workers',
+                '1',
+                '--drain-timeout',
+                '2',
+                *options,
+            ],
+            stdout=subprocess.PIPE,
+            stderr=self.log,
+            text=True,
+            env={**os.environ, **(env or {})},
+        )
+        line = self.process.stdout.readline()
+        if not line.startswith('listening on '):
+            self.process.wait(10)
+            raise AssertionError('did not start: ' + self.errors())
+        self.address = line.split('://')[1].strip()
+        self.scheme = line.split('://')[0].split()[-1]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+
+    def errors(self):
+        with open(self.log.name, encoding='utf-8', errors='replace') as file:
+            return file.read()
+
+    def connect(self, timeout=30):
+        return http.client.HTTPConnection(self.address, timeout=timeout)
+
+    def ask(self, method, path, body=None, headers=None, timeout=30):
+        connection = self.connect(timeout)
+        try:
+            if isinstance(body, (dict, list)):
+                body, headers = json.dumps(body).encode(), {**JSON, **(headers or {})}
+            connection.request(method, path, body, headers or {})
+            response = connection.getresponse()
+            return Answer(response, response.read())
+        finally:
+            connection.close()
+
+    def get(self, path, **headers):
+        return self.ask('GET', path, headers={k.replace('_', '-'): v for k, v in headers.items()})
+
+    def submit(self, wait=20, **changes):
+        """Submits a side; returns the document, finished unless wait is 0."""
+        headers = {'Prefer': f'wait={wait}'} if wait else {}
+        answer = self.ask('POST', '/v1/assessments', side(**changes), headers, timeout=wait + 30)
+        assert answer.status in (201, 202), (answer.status, answer.body)
+        return answer.json()
+
+    def until(self, identity, *statuses, seconds=20):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            document = self.get(f'/v1/assessments/{identity}').json()
+            if document['status'] in statuses:
+                return document
+            time.sleep(0.05)
+        raise AssertionError(f'{identity} is {document["status"]}, not {statuses}')
+
+    def until_ready(self, seconds=20, **headers):
+        end = time.monotonic() + seconds
+        while self.ask('GET', '/readyz', headers=headers).status != 200:
+            assert time.monotonic() < end, 'never ready'
+            time.sleep(0.05)
+
+    def signal(self, number):
+        self.process.send_signal(number)
+
+    def stop(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        try:
+            status = self.process.wait(30)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+        self.process.stdout.close()
+        self.log.close()
+        if status != 0:
+            sys.stderr.write(self.errors())
+        assert status == 0, f'ischiad ended with {status}'
+        if self.own_state:
+            shutil.rmtree(self.state, ignore_errors=True)

@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""openapi.json against the program, both ways: the routes, the limits, the kinds of problems, and
+every answer of a tour of the service against its schema (contract.mjs, with ajv)."""
+import filecmp
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+import urllib.parse
+
+from service import HERE, JSON, PROGRAM, SIDE, Service, side
+
+METHODS = ('get', 'post', 'put', 'patch', 'delete')
+FORM = {'Content-Type': 'application/x-www-form-urlencoded'}
+
+
+def install_validators():
+    """npm ci, unless what the lock file names is there already."""
+    lock, done = (
+        os.path.join(HERE, name) for name in ('package-lock.json', 'node_modules/.ischia-lock')
+    )
+    if os.path.exists(done) and filecmp.cmp(lock, done, shallow=False):
+        return
+    subprocess.run(
+        ['npm', 'ci', '--ignore-scripts', '--no-audit', '--no-fund', '--loglevel=error'],
+        cwd=HERE,
+        check=True,
+        timeout=240,
+    )
+    shutil.copyfile(lock, done)
+
+
+class Contract(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        install_validators()
+        cls.service = Service()
+        cls.service.until_ready()
+        cls.contract = cls.service.get('/openapi.json').json()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.service.stop()
+
+    def operations(self):
+        for path, item in self.contract['paths'].items():
+            for method in METHODS:
+                if method in item:
+                    yield method, path, item[method]
+
+    def test_the_routes_are_those_of_the_program(self):
+        listed = subprocess.run(
+            [PROGRAM, '--print-routes'], capture_output=True, text=True, check=True
+        )
+        program = {}
+        for line in listed.stdout.splitlines():
+            method, path, *rest = line.split()
+            if rest[0] != 'page':
+                program[(method.lower(), path)] = rest[0]
+        contract = {
+            (method, path): operation.get('x-scope', 'open')
+            for method, path, operation in self.operations()
+        }
+        self.assertEqual(contract, program)
+
+    def test_the_limits_are_those_of_the_tables(self):
+        schemas = self.contract['components']['schemas']
+        served = self.service.get('/v1/parameters').json()
+        for parameter in served['parameters']:
+            for schema in (schemas['Request'], schemas['Assessment']['properties']['parameters']):
+                for key in [parameter['key']] + (
+                    parameter['aliases'] if schema is schemas['Request'] else []
+                ):
+                    limits = schema['properties'][key]
+                    self.assertEqual(
+                        (limits['minimum'], limits['maximum']),
+                        (parameter['accepted']['min'], parameter['accepted']['max']),
+                        key,
+                    )
+        request = schemas['Request']['properties']
+        for option in served['options']:
+            group = request[option['group']]
+            group = group['oneOf'][1] if 'oneOf' in group else group
+            limits = group['properties'][option['key']]
+            self.assertEqual(
+                (limits['minimum'], limits['maximum'], limits['default']),
+                (option['accepted']['min'], option['accepted']['max'], option['default']),
+            )
+        self.assertEqual(request['resolution']['enum'], [r['name'] for r in served['resolutions']])
+
+    def test_the_query_parameters_are_taken_and_no_others(self):
+        for method, path, operation in self.operations():
+            if method != 'get' or '{' in path:
+                continue
+            names = [p['name'] for p in operation.get('parameters', []) if p.get('in') == 'query']
+            for name in names:
+                self.assertLess(self.service.get(f'{path}?{name}=').status, 500)
+            answer = self.service.get(f'{path}?nothing=1')
+            self.assertEqual(answer.status, 400, path)
+
+    def tour(self):
+        """Asks for everything in all ways; yields what contract.mjs checks."""
+        asked = []
+
+        def ask(method, path, template, body=None, headers=None):
+            answer = self.service.ask(method, path, body, headers)
+            asked.append(
+                {
+                    'method': method.lower(),
+                    'path': template,
+                    'status': answer.status,
+                    'type': answer.type,
+                    'headers': sorted(h.lower() for h in answer.headers),
+                    'body': answer.body.decode(),
+                }
+            )
+            return answer
+
+        many = '/v1/assessments'
+        made = ask(
+            'POST',
+            many,
+            many,
+            side(F=400.5, subject='T-1', side='left', R2=80),
+            {'Prefer': 'wait=20'},
+        )
+        ask('POST', many, many, side(F=401.5))
+        ask('POST', many, many, side(muM=99))
+        ask('POST', many, many, b'{', JSON)
+        ask('POST', many, many, b'x', {'Content-Type': 'text/plain'})
+        ask('POST', many, many, b' ' * 70000, JSON)
+        ask('POST', many, many, urllib.parse.urlencode({**SIDE, 'F': 402.5}).encode(), FORM)
+        failed = ask('POST', many, many, side(F=598, eM=22), {'Prefer': 'wait=20'})
+        hanging = ask('POST', many, many, side(F=599, eM=22))
+        for query in ('', '?limit=1', '?status=failed', '?limit=0'):
+            ask('GET', many + query, many)
+        ask('GET', many, many, headers={'Accept': 'text/csv'})
+        ask('GET', many, many, headers={'Accept': 'image/png'})
+        ask('GET', many, many, headers={'Host': 'evil.example'})
+        one = many + '/{id}'
+        self.service.until(hanging.json()['id'], 'running')
+        for document in (made.json(), failed.json(), hanging.json()):
+            path = document['links']['self']
+            for suffix in ('', '/report', '/section.svg', '/field.vtu'):
+                answer = ask('GET', path + suffix, one + suffix)
+                if 'ETag' in answer.headers:
+                    ask(
+                        'GET',
+                        path + suffix,
+                        one + suffix,
+                        headers={'If-None-Match': answer.headers['ETag']},
+                    )
+        ask('GET', failed.json()['links']['self'] + '/events', one + '/events')
+        ask('DELETE', hanging.json()['links']['self'], one)
+        ask('POST', hanging.json()['links']['self'] + '/cancel', one + '/cancel')
+        ask('POST', made.json()['links']['self'] + '/cancel', one + '/cancel')
+        ask('DELETE', made.json()['links']['self'], one)
+        for suffix, method in (
+            ('', 'GET'),
+            ('', 'DELETE'),
+            ('/cancel', 'POST'),
+            ('/events', 'GET'),
+            ('/report', 'GET'),
+            ('/field.vtu', 'GET'),
+            ('/section.svg', 'GET'),
+        ):
+            ask(method, made.json()['links']['self'] + suffix, one + suffix)
+        for path in (
+            '/v1/parameters',
+            '/v1/changes',
+            '/openapi.json',
+            '/healthz',
+            '/readyz',
+            '/metrics',
+            '/version',
+        ):
+            ask('GET', path, path)
+            ask('PUT', path, path)
+            ask('GET', path, path, headers={'Accept': 'image/png'})
+        ask('GET', '/v1/changes?since=x', '/v1/changes')
+        return asked
+
+    def test_every_answer_fits_the_contract(self):
+        asked = self.tour()
+        toured = {(a['method'], a['path']) for a in asked}
+        self.assertEqual({(m, p) for m, p, _ in self.operations()} - toured, set())
+        with tempfile.TemporaryDirectory() as folder:
+            files = [os.path.join(folder, name) for name in ('openapi.json', 'asked.json')]
+            for name, content in zip(files, (self.contract, asked)):
+                with open(name, 'w', encoding='utf-8') as file:
+                    json.dump(content, file)
+            checked = subprocess.run(
+                ['node', os.path.join(HERE, 'contract.mjs'), *files],
+                capture_output=True,
+                text=True,
+                timeout=120,
+            )
+        self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+        self.assertIn(f'{len(asked)} answers fit', checked.stdout)
+
+    def test_every_kind_of_problem_is_explained(self):
+        page = self.service.get('/docs').body.decode()
+        for status, path, method in ((404, '/nothing', 'GET'), (405, '/healthz', 'POST')):
+            problem = self.service.ask(method, path).json()
+            self.assertEqual(problem['status'], status)
+            self.assertIn(f'id="{problem["type"].split("#")[1]}"', page)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,98 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/API.md: each of its curl lines is run, in order, and each route has one. The manual page and
+the sample configuration are those of the program."""
+import os
+import re
+import subprocess
+import tempfile
+import unittest
+
+from service import HERE, PROGRAM, Service
+
+ROOT = os.path.join(HERE, '../..')
+
+
+def read(*path):
+    with open(os.path.join(ROOT, *path), encoding='utf-8') as file:
+        return file.read()
+
+
+def curl_lines():
+    blocks = re.findall(r'```sh\n(.*?)```', read('docs/API.md'), re.S)
+    return [line for block in blocks for line in block.splitlines() if line.startswith('curl ')]
+
+
+def route_of(line):
+    path = re.search(r'"\$ISCHIA(/[^"?]*)', line).group(1)
+    path = re.sub(r'\$(ID|RUNNING)', '{id}', path)
+    if '-X' in line:
+        return re.search(r'-X (\w+)', line).group(1), path
+    return ('POST' if ' -d ' in line else 'GET'), path
+
+
+class Docs(unittest.TestCase):
+    def test_every_route_has_a_curl_line(self):
+        listed = subprocess.run(
+            [PROGRAM, '--print-routes'], capture_output=True, text=True, check=True
+        )
+        routes = {
+            tuple(line.split()[:2]) for line in listed.stdout.splitlines() if ' page ' not in line
+        }
+        self.assertEqual(routes, {route_of(line) for line in curl_lines()})
+
+    def test_every_curl_line_works(self):
+        with Service() as service, tempfile.TemporaryDirectory() as folder:
+            service.until_ready()
+            environment = {
+                **os.environ,
+                'ISCHIA': 'http://' + service.address,
+                'ID': service.submit(F=250.5, subject='P-017', side='left')['id'],
+                'RUNNING': service.submit(wait=0, F=599)['id'],
+            }
+            lines = sorted(curl_lines(), key=lambda line: '/cancel' not in line)
+            for line in lines:
+                done = subprocess.run(
+                    ['bash', '-c', line],
+                    env=environment,
+                    cwd=folder,
+                    timeout=60,
+                    capture_output=True,
+                    text=True,
+                )
+                self.assertEqual(done.returncode, 0, f'{line}\n{done.stderr}')
+            self.assertTrue(os.path.getsize(os.path.join(folder, 'report.html')) > 0)
+
+    def test_the_manual_lists_the_options_of_the_program(self):
+        printed = subprocess.run(
+            [PROGRAM, '--print-man'], capture_output=True, text=True, check=True
+        )
+        self.assertIn(
+            printed.stdout,
+            read('docs/man/ischiad.8'),
+            'write the output of `ischiad --print-man` into docs/man/ischiad.8',
+        )
+
+    def test_the_sample_configuration_is_the_default(self):
+        sample = os.path.join(ROOT, 'deploy/ischiad.conf')
+        given = subprocess.run(
+            [PROGRAM, '--config', sample, '--print-config'],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        usual = subprocess.run(
+            [PROGRAM, '--print-config'], capture_output=True, text=True, check=True
+        )
+        self.assertEqual(given.stdout, usual.stdout)
+
+    def test_operations_names_every_metric(self):
+        page = read('docs/OPERATIONS.md')
+        with Service() as service:
+            metrics = service.get('/metrics').body.decode()
+        for name in re.findall(r'# TYPE (\w+)', metrics):
+            self.assertIn(f'`{name}`', page)
+
+
+if __name__ == '__main__':
+    unittest.main()

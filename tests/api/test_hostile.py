@@ -1,0 +1,339 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clients that mean harm, or are merely broken: none costs anybody else anything."""
+import json
+import os
+import random
+import re
+import signal
+import socket
+import threading
+import time
+import unittest
+
+from service import Service, side
+
+BODY = json.dumps(side(F=130.5)).encode()
+
+
+class Hostile(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.service = Service(
+            '--request-timeout',
+            '2',
+            '--idle-timeout',
+            '4',
+            '--connections',
+            '300',
+            '--connections-per-address',
+            '250',
+        )
+        cls.service.until_ready()
+        host, port = cls.service.address.split(':')
+        cls.where = (host, int(port))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.service.stop()
+
+    def setUp(self):
+        """What the test before left behind is gone soon."""
+        end = time.monotonic() + 8
+        while self.connections() > 3:
+            self.assertLess(time.monotonic(), end, 'connections that were left are kept')
+            time.sleep(0.1)
+
+    def tearDown(self):
+        self.assertIsNone(self.service.process.poll(), self.service.errors()[-2000:])
+
+    def connections(self):
+        text = self.service.get('/metrics').body.decode()
+        return int(re.search(r'^ischia_http_connections (\d+)', text, re.M).group(1))
+
+    def test_those_who_leave_in_the_middle_are_forgotten(self):
+        with Service('--request-timeout', '3000', '--idle-timeout', '3000') as service:
+            host, port = service.address.split(':')
+            for text in (
+                b'',
+                b'GET /hea',
+                b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+                b'Content-Type: application/json\r\nContent-Length: 99\r\n\r\n{',
+            ):
+                for _ in range(20):
+                    connection = socket.create_connection((host, int(port)), timeout=10)
+                    connection.sendall(text)
+                    connection.close()
+            end = time.monotonic() + 8
+            while 'ischia_http_connections 1\n' not in service.get('/metrics').body.decode():
+                self.assertLess(time.monotonic(), end)
+                time.sleep(0.2)
+
+    def open(self):
+        return socket.create_connection(self.where, timeout=10)
+
+    def read_all(self, connection):
+        text = b''
+        try:
+            while chunk := connection.recv(65536):
+                text += chunk
+        except (ConnectionResetError, BrokenPipeError):
+            pass
+        connection.close()
+        return text
+
+    def raw(self, text):
+        connection = self.open()
+        connection.sendall(text)
+        return self.read_all(connection)
+
+    def alive_within(self, seconds):
+        begun = time.monotonic()
+        self.assertEqual(self.service.get('/healthz').status, 200)
+        self.assertLess(time.monotonic() - begun, seconds)
+
+    def test_a_slow_head_is_cut_off(self):
+        connections = [self.open() for _ in range(20)]
+        for connection in connections:
+            connection.sendall(b'GET / HTTP/1.1\r\nHost: localhost\r\n')
+        begun = time.monotonic()
+        while time.monotonic() - begun < 5:
+            alive = 0
+            for connection in connections:
+                try:
+                    connection.sendall(b'X: y\r\n')
+                    alive += 1
+                except OSError:
+                    pass
+            self.alive_within(1)
+            if not alive:
+                break
+            time.sleep(0.2)
+        self.assertEqual(alive, 0, 'slow heads were tolerated for 5 s; the limit is 2 s')
+        for connection in connections:
+            connection.close()
+
+    def test_a_slow_body_is_408(self):
+        connection = self.open()
+        connection.sendall(
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\nContent-Length: 200\r\n\r\n{'
+        )
+        text = self.read_all(connection)
+        self.assertTrue(text.startswith(b'HTTP/1.1 408 '), text)
+        head, body = text.split(b'\r\n\r\n', 1)
+        self.assertIn(b'application/problem+json', head)
+        self.assertIn(f'Content-Length: {len(body)}'.encode(), head)
+        self.assertEqual(json.loads(body)['status'], 408)
+
+    def test_half_a_body_and_gone(self):
+        for _ in range(50):
+            connection = self.open()
+            connection.sendall(
+                b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+                b'Content-Type: application/json\r\nContent-Length: 500\r\n\r\n' + BODY
+            )
+            connection.close()
+        self.alive_within(1)
+        self.assertNotIn('130.5', self.service.get('/v1/assessments').body.decode())
+
+    def test_an_endless_body_is_ended(self):
+        connection = self.open()
+        connection.sendall(
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n'
+        )
+        sent = 0
+        try:
+            while sent < 64 << 20:
+                connection.sendall(b'8000\r\n' + b' ' * 0x8000 + b'\r\n')
+                sent += 0x8000
+        except OSError:
+            pass
+        self.assertLess(sent, 16 << 20)
+        connection.close()
+        self.alive_within(1)
+
+    def test_a_huge_head_is_refused(self):
+        text = self.raw(
+            b'GET / HTTP/1.1\r\nHost: localhost\r\n' + b'X-A: ' + b'a' * 20000 + b'\r\n\r\n'
+        )
+        self.assertTrue(text.startswith(b'HTTP/1.1 431 '), text[:80])
+        self.assertIn(b'application/problem+json', text)
+        text = self.raw(b'GET /' + b'a' * 100000 + b' HTTP/1.1\r\nHost: localhost\r\n\r\n')
+        self.assertRegex(text[:13], rb'HTTP/1.1 4\d\d|')
+        self.alive_within(1)
+
+    def test_what_is_not_http_is_refused(self):
+        for text in (
+            b'\0' * 100,
+            b'GET\r\n\r\n',
+            b'GET / HTTP/9.9\r\n\r\n',
+            b'\x16\x03\x01\x02\x00\x01',
+            b'GET / HTTP/1.1\r\n\r\n',
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n' b'Content-Length: -1\r\n\r\n',
+            b'GET /%00 HTTP/1.1\r\nHost: localhost\r\n\r\n',
+            b'GET /%2e%2e/%2e%2e/etc/passwd HTTP/1.1\r\nHost: localhost\r\n\r\n',
+            b'BREW / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n',
+        ):
+            connection = self.open()
+            connection.sendall(text)
+            connection.shutdown(socket.SHUT_WR)
+            answer = self.read_all(connection)
+            self.assertNotIn(b' 200 ', answer[:20], text)
+        self.alive_within(1)
+
+    def test_two_lengths_do_not_smuggle_a_request(self):
+        text = self.raw(
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\nContent-Length: 4\r\n'
+            b'Transfer-Encoding: chunked\r\nConnection: close\r\n\r\n'
+            b'0\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n'
+        )
+        self.assertNotIn(b'alive', text)
+
+    def test_pipelined_requests_are_answered_in_order(self):
+        text = self.raw(
+            b'GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n' * 5
+            + b'GET /version HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n'
+        )
+        self.assertEqual(text.count(b'HTTP/1.1 200 OK'), 6)
+        self.assertGreater(text.index(b'"program"'), text.rindex(b'alive'))
+
+    def test_one_address_cannot_take_every_connection(self):
+        connections = []
+        try:
+            for _ in range(280):
+                connections.append(self.open())
+            time.sleep(0.5)
+            refused = 0
+            for connection in connections:
+                connection.setblocking(False)
+                try:
+                    refused += connection.recv(1) == b''
+                except BlockingIOError:
+                    pass
+                except ConnectionResetError:
+                    refused += 1
+            self.assertGreaterEqual(refused, 20)
+        finally:
+            for connection in connections:
+                connection.close()
+        time.sleep(0.5)
+        self.alive_within(1)
+
+    def test_those_who_do_not_read_their_streams(self):
+        document = self.service.submit(wait=0, F=599, eM=25)
+        path = document['links']['self'].encode()
+        streams = []
+        for _ in range(100):
+            connection = self.open()
+            connection.sendall(b'GET ' + path + b'/events HTTP/1.1\r\nHost: localhost\r\n\r\n')
+            streams.append(connection)
+        self.alive_within(1)
+        for connection in streams[::2]:
+            connection.close()
+        self.assertEqual(self.service.ask('POST', path.decode() + '/cancel').status, 200)
+        for connection in streams[1::2]:
+            self.assertIn(b'event: done', self.read_all(connection))
+        self.alive_within(1)
+
+    def test_waiters_that_leave(self):
+        document = self.service.submit(wait=0, F=599, eM=26)
+        path = document['links']['self'].encode()
+        for _ in range(50):
+            connection = self.open()
+            connection.sendall(
+                b'GET ' + path + b' HTTP/1.1\r\nHost: localhost\r\nPrefer: wait=30\r\n\r\n'
+            )
+            connection.close()
+        self.assertEqual(self.service.ask('POST', path.decode() + '/cancel').status, 200)
+        self.alive_within(1)
+
+    def test_noise(self):
+        rng = random.Random(7)
+        good = (
+            b'POST /v1/assessments?x=1 HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\n'
+            b'Content-Length: %d\r\n\r\n' % len(BODY)
+        ) + BODY
+        for _ in range(150):
+            text = bytearray(good)
+            for _ in range(rng.randint(1, 8)):
+                text[rng.randrange(len(text))] = rng.randrange(256)
+            connection = self.open()
+            connection.sendall(bytes(text[: rng.randint(1, len(text))]))
+            connection.close()
+        self.alive_within(1)
+
+
+class Stopping(unittest.TestCase):
+    def test_sigterm_lets_a_running_solve_finish(self):
+        service = Service('--drain-timeout', '20')
+        service.until_ready()
+        document = service.submit(wait=0, F=596, eM=27)
+        service.until(document['id'], 'running')
+        waited = []
+
+        def wait():
+            answer = service.ask('GET', document['links']['self'], headers={'Prefer': 'wait=20'})
+            waited.append(answer.json()['status'])
+
+        thread = threading.Thread(target=wait)
+        thread.start()
+        time.sleep(0.2)
+        service.signal(signal.SIGTERM)
+        time.sleep(0.2)
+        refused = service.ask('POST', '/v1/assessments', side())
+        self.assertEqual(
+            (refused.status, refused.json()['type']), (503, '/docs#problem-unavailable')
+        )
+        self.assertTrue(refused.headers['Retry-After'])
+        self.assertEqual(service.ask('GET', '/readyz').status, 503)
+        thread.join()
+        self.assertEqual(waited, ['succeeded'])
+        service.stop()
+
+    def test_a_solve_over_the_drain_time_returns_to_the_queue(self):
+        service = Service('--drain-timeout', '1')
+        service.until_ready()
+        running = service.submit(wait=0, F=599, eM=28)
+        service.until(running['id'], 'running')
+        queued = [service.submit(wait=0, F=140.5 + i)['id'] for i in range(3)]
+        service.own_state = False
+        service.stop()
+        with Service(state=service.state) as again:
+            self.assertEqual(
+                again.ask('POST', f'/v1/assessments/{running["id"]}/cancel').status, 200
+            )
+            for identity in queued:
+                again.until(identity, 'succeeded')
+            again.own_state = True
+
+    def test_streams_end_when_it_stops(self):
+        service = Service('--drain-timeout', '0')
+        service.until_ready()
+        path = service.submit(wait=0, F=599, eM=29)['links']['self']
+        connection = service.connect()
+        connection.request('GET', path + '/events')
+        response = connection.getresponse()
+        reader = threading.Thread(target=response.read)
+        reader.start()
+        begun = time.monotonic()
+        service.stop()
+        reader.join(5)
+        self.assertFalse(reader.is_alive())
+        self.assertLess(time.monotonic() - begun, 10)
+        connection.close()
+
+    def test_a_second_daemon_on_the_same_store_is_refused(self):
+        with Service() as service:
+            with self.assertRaises(AssertionError) as refused:
+                Service(state=service.state)
+            self.assertIn('did not start', str(refused.exception))
+            self.assertEqual(service.get('/healthz').status, 200)
+            self.assertTrue(os.path.isdir(service.state))
+
+
+if __name__ == '__main__':
+    unittest.main()

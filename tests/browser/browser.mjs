@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What every browser test needs: Debian's Chromium, pages that are watched, axe-core.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { fileURLToPath } from 'node:url';
+import { chromium } from 'playwright-core';
+import { StandIn } from './stand_in.mjs';
+
+export const dist = fileURLToPath(new URL('../../static/dist', import.meta.url));
+const axe_source = readFileSync(
+  createRequire(import.meta.url).resolve('axe-core/axe.min.js'),
+  'utf8',
+);
+
+const flags = [
+  '--headless',
+  '--no-sandbox',
+  '--disable-quic',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+  '--disable-default-apps',
+  '--no-default-browser-check',
+];
+/* WebGL drawn in software, for the 3-D view; or none at all, as on many a workstation. */
+const with_webgl = [
+  '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader',
+  '--ignore-gpu-blocklist',
+];
+const without_webgl = ['--disable-gpu', '--disable-3d-apis'];
+
+export function launch({ webgl = false } = {}) {
+  return chromium.launch({
+    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+    args: [...flags, ...(webgl ? with_webgl : without_webgl)],
+  });
+}
+
+/* A page whose every request, error and CSP violation is recorded. */
+export async function watched_page(browser, origin, options = {}) {
+  const context = await browser.newContext({
+    viewport: { width: 1366, height: 768 },
+    locale: 'en-GB',
+    timezoneId: 'UTC',
+    ...options,
+  });
+  const page = await context.newPage();
+  const seen = { foreign: [], errors: [], violations: [] };
+  page.on('request', (r) => {
+    const url = r.url();
+    if (!url.startsWith(origin) && !url.startsWith('blob:') && !url.startsWith('data:'))
+      seen.foreign.push(url);
+  });
+  page.on('pageerror', (e) => seen.errors.push(e.message));
+  page.on('console', (m) => {
+    if (/content security policy/i.test(m.text())) seen.violations.push(m.text());
+  });
+  page.seen = seen;
+  return page;
+}
+
+/* Nothing left the origin, nothing was thrown, the policy was never broken. */
+export function assert_clean(page) {
+  assert.deepEqual(page.seen, { foreign: [], errors: [], violations: [] });
+}
+
+/* No WCAG 2.2 AA violation, nor of axe's best practices, on the page as it stands. */
+export async function assert_accessible(page, what) {
+  await page.evaluate(axe_source);
+  const { violations, passes } = await page.evaluate(() =>
+    window.axe.run(document, {
+      runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'],
+    }),
+  );
+  const found = violations.map(
+    (v) => `${v.id}: ${v.nodes.map((n) => n.html.slice(0, 160)).join(' | ')}`,
+  );
+  assert.deepEqual(found, [], what);
+  assert.ok(passes.length > 10, `${what}: axe looked at too little`);
+}
+
+/* A stand-in daemon and a browser for one test file; `finish` ends both. */
+export async function stage(options) {
+  const daemon = new StandIn(dist);
+  const origin = await daemon.start();
+  const browser = await launch(options);
+  return {
+    daemon,
+    origin,
+    browser,
+    page: (page_options) => watched_page(browser, origin, page_options),
+    finish: async () => {
+      await browser.close();
+      await daemon.finish();
+    },
+  };
+}
+
+export const sample = {
+  left: { R1: '7.1', R2: '22.8', eM: '31', eF: '10', muM: '8', muF: '5', F: '258' },
+  right: { R1: '6.9', R2: '19.7', eM: '28', eF: '10', muM: '8', muF: '5', F: '196' },
+};
+
+export async function open_form(page, origin) {
+  await page.goto(`${origin}/`);
+  await page.locator('fieldset.side').first().waitFor();
+}
+
+export async function fill_side(page, side, values = sample[side]) {
+  for (const [key, text] of Object.entries(values)) await page.fill(`#${side}-${key}`, text);
+}
+
+/* Sends the form and waits until every side of the result page has ended. */
+export async function submit_and_wait(page, sides = 2) {
+  await page.click('button[type=submit]');
+  await page.waitForURL('**/assessments/**');
+  await page.waitForFunction((n) => document.querySelectorAll('.glance').length === n, sides);
+}
+
+export const reading = (page, side, key) => page.locator(`#${side}-${key}-reading`);

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The form: what it accepts, what it refuses and how it says so, its drawing, without a mouse,
+// without JavaScript.
+import assert from 'node:assert/strict';
+import { after, afterEach, before, beforeEach, test } from 'node:test';
+import {
+  assert_accessible,
+  assert_clean,
+  fill_side,
+  open_form,
+  reading,
+  sample,
+  stage,
+  submit_and_wait,
+} from './browser.mjs';
+import { parameters } from './stand_in.mjs';
+
+let s, page;
+before(async () => {
+  s = await stage();
+});
+after(() => s.finish());
+beforeEach(async () => {
+  page = await s.page();
+  await open_form(page, s.origin);
+});
+afterEach(async () => {
+  assert_clean(page);
+  await page.context().close();
+});
+
+const text_of = async (side, key) => (await reading(page, side, key).innerText()).trim();
+const leave = () => page.locator('h1').click();
+
+test('limits, units and names come from the daemon', async () => {
+  for (const { key, unit, accepted, studied } of parameters.parameters) {
+    const range = await page.locator(`#left-${key}-range`).innerText();
+    assert.ok(range.includes(`${accepted.min} to ${accepted.max} ${unit}`), range);
+    assert.ok(range.includes(`studied ${studied.min} to ${studied.max}`), range);
+  }
+});
+
+test('decimal comma and decimal point mean the same, and the value is echoed', async () => {
+  await page.fill('#left-R1', '7,1');
+  assert.equal(await text_of('left', 'R1'), '= 7.1 mm');
+  await page.fill('#left-R1', '7.1');
+  assert.equal(await text_of('left', 'R1'), '= 7.1 mm');
+});
+
+test('two decimal marks are refused as typed', async () => {
+  for (const text of ['1,234.5', '1.234,5', '1,234,5']) {
+    await page.fill('#left-R2', text);
+    assert.match(await text_of('left', 'R2'), /More than one decimal mark/);
+    assert.equal(await page.getAttribute('#left-R2', 'aria-invalid'), 'true');
+  }
+});
+
+test('what is no number, too small or too large is refused beside its field', async () => {
+  const cases = [
+    ['eM', '3x', /Not a number/],
+    ['eM', '61', /Above 60 mm/],
+    ['eM', '4', /Below 5 mm/],
+    ['eM', '-20', /Below 5 mm/],
+    ['muM', '0,4', /Below 0.5 kPa/],
+    ['F', '601', /Above 600 N/],
+  ];
+  for (const [key, text, expected] of cases) {
+    await page.fill(`#right-${key}`, text);
+    await leave();
+    assert.match(await text_of('right', key), expected, `${key} ${text}`);
+  }
+});
+
+test('a number that is still being typed is not called too small', async () => {
+  await page.focus('#left-eM');
+  await page.keyboard.type('3');
+  assert.equal(await page.getAttribute('#left-eM', 'aria-invalid'), 'false');
+  await page.keyboard.type('1');
+  assert.equal(await text_of('left', 'eM'), '= 31 mm');
+});
+
+test('outside the studied range is a note, not a fault', async () => {
+  await page.fill('#left-muM', '12');
+  await leave();
+  assert.match(await text_of('left', 'muM'), /Outside the studied range/);
+  assert.equal(await page.getAttribute('#left-muM', 'aria-invalid'), 'false');
+});
+
+test('swapped radii are noticed and swapped back with one click', async () => {
+  await fill_side(page, 'left', { ...sample.left, R1: '14', R2: '9' });
+  await leave();
+  assert.match(await text_of('left', 'R2'), /Smaller than R1/);
+  await page.click('text=Swap R1 and R2');
+  assert.equal(await page.inputValue('#left-R1'), '9');
+  assert.equal(await page.inputValue('#left-R2'), '14');
+  assert.equal(await text_of('left', 'R2').then((t) => /Smaller/.test(t)), false);
+});
+
+test('total thickness gives eM, and says how', async () => {
+  await fill_side(page, 'left');
+  await page.getByLabel(/total thickness of muscle and fat instead of eM, Left/).check();
+  await page.fill('#left-eM', '41,2');
+  assert.equal(await text_of('left', 'eM'), 'eM = 41,2 − 10 = 31.2 mm');
+  await page.fill('#left-eM', '80');
+  assert.match(await text_of('left', 'eM'), /Above 60 mm/);
+  await page.fill('#left-eM', '41.2');
+  await submit_and_wait(page, 1);
+  const [document] = [...s.daemon.documents.values()].slice(-1);
+  assert.equal(document.parameters.eM, 31.2);
+});
+
+test('sending faults lists them all, links to the fields and sends nothing', async () => {
+  const before_count = s.daemon.documents.size;
+  await fill_side(page, 'left', { ...sample.left, R1: '1,234.5', eM: '80', F: '' });
+  await page.fill('#subject', 'P-1');
+  await page.click('button[type=submit]');
+  const box = page.locator('.errors');
+  assert.equal(await box.locator('li').count(), 3);
+  assert.ok(await box.evaluate((e) => e === document.activeElement));
+  await assert_accessible(page, 'the form with faults');
+  await box.getByRole('link', { name: 'Left, F' }).click();
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'left-F');
+  assert.equal(s.daemon.documents.size, before_count);
+});
+
+test('an empty form is not sent', async () => {
+  await page.click('button[type=submit]');
+  assert.match(await page.locator('.errors').innerText(), /at least one side/);
+});
+
+test('a name is no subject code', async () => {
+  await page.fill('#subject', 'Jane Doe');
+  assert.match(await page.locator('#subject-note').innerText(), /Only letters, digits/);
+  await fill_side(page, 'left');
+  await page.click('button[type=submit]');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'subject');
+});
+
+test('what only the server refuses is shown beside the field', async () => {
+  await page.fill('#subject', 'odd-1');
+  await fill_side(page, 'left');
+  await page.click('button[type=submit]');
+  await page.locator('.errors').waitFor();
+  assert.match(await text_of('left', 'muM'), /refused by the server alone/);
+  await page.fill('#left-muM', '7');
+  assert.equal(await text_of('left', 'muM'), '= 7 kPa');
+});
+
+test('a full queue loses nothing', async () => {
+  await page.fill('#subject', 'busy-1');
+  await fill_side(page, 'left');
+  await page.click('button[type=submit]');
+  assert.match(await page.locator('.errors').innerText(), /queue is full/);
+  assert.equal(await page.inputValue('#left-R1'), '7.1');
+});
+
+test('sending again what was sent makes no second assessment', async () => {
+  let dropped = false;
+  await page.route('**/v1/assessments', async (route) => {
+    const response = await route.fetch();
+    if (dropped) return route.fulfill({ response });
+    dropped = true;
+    return route.abort();
+  });
+  const before_count = s.daemon.documents.size;
+  await fill_side(page, 'left');
+  await page.click('button[type=submit]');
+  await page.locator('.errors').waitFor();
+  assert.match(await page.locator('.errors').innerText(), /does not answer/);
+  await submit_and_wait(page, 1);
+  assert.equal(s.daemon.documents.size, before_count + 1);
+});
+
+test('a sample person fills both sides with one click', async () => {
+  await page.getByRole('button', { name: 'Fill in' }).click();
+  for (const side of ['left', 'right'])
+    for (const [key, text] of Object.entries(sample[side]))
+      assert.equal(
+        Number(await page.inputValue(`#${side}-${key}`)),
+        Number(text),
+        `${side} ${key}`,
+      );
+  assert.equal(await page.inputValue('#subject'), 'table2-1');
+  assert.equal(await page.locator('#sample option').count(), 13);
+  await assert_accessible(page, 'the filled form');
+});
+
+test('the drawing is to scale and shows a slip of the decimal mark', async () => {
+  const layer = async (name) =>
+    Number(await page.locator(`.side.left .tissue.${name}`).getAttribute('height'));
+  assert.equal(await page.locator('.side.left .drawing .tissue').count(), 0);
+  await fill_side(page, 'left');
+  const [fat, muscle] = [await layer('fat'), await layer('muscle')];
+  assert.ok(
+    Math.abs(muscle / fat - (31 + 7.1) / 10) < 1e-6,
+  ); /* muscle up to the top of the tissue */
+  const ring = () => page.locator('.side.left .bone').nth(1).getAttribute('d');
+  const before_slip = await ring();
+  await page.fill('#left-R2', '228');
+  assert.notEqual(await ring(), before_slip);
+  await page.fill('#left-eF', '100');
+  assert.ok((await layer('fat')) > 3 * fat);
+});
+
+test('every field has a name, a description and a help text', async () => {
+  const field = page.getByRole('textbox', { name: 'R1 Smaller bone radius' }).first();
+  assert.equal(await field.getAttribute('aria-describedby'), 'left-R1-reading left-R1-range');
+  const help = page.getByRole('button', { name: 'About Smaller bone radius, Left' });
+  await help.click();
+  assert.equal(await help.getAttribute('aria-expanded'), 'true');
+  assert.ok(await page.locator('#left-R1-help').isVisible());
+  await assert_accessible(page, 'the form with help open');
+  await page.keyboard.press('Escape');
+  assert.ok(await page.locator('#left-R1-help').isHidden());
+});
+
+test('Tab goes through the left side, then the right, then the button', async () => {
+  await page.focus('#subject');
+  const visited = [];
+  for (let i = 0; i < 60; i++) {
+    await page.keyboard.press('Tab');
+    const id = await page.evaluate(() => document.activeElement.id || document.activeElement.type);
+    if (/^(left|right)-\w+$/.test(id)) visited.push(id);
+    if (id === 'submit') break;
+  }
+  const keys = parameters.parameters.map((p) => p.key);
+  assert.deepEqual(
+    visited,
+    ['left', 'right'].flatMap((side) => keys.map((key) => `${side}-${key}`)),
+  );
+});
+
+test('a keyboard is enough to compute', async () => {
+  await page.focus('#left-R1');
+  for (const text of Object.values(sample.left)) {
+    await page.keyboard.type(text);
+    const id = await page.evaluate(() => document.activeElement.id);
+    const next = id === 'left-F' ? 'Enter' : 'Tab';
+    await page.keyboard.press(next);
+    while (
+      next === 'Tab' &&
+      !(await page.evaluate(() => /^left-\w+$/.test(document.activeElement.id)))
+    )
+      await page.keyboard.press('Tab');
+  }
+  await page.waitForURL('**/assessments/**');
+  await page.locator('.glance').waitFor();
+});
+
+test('French and German: words, decimal comma, names for screen readers', async () => {
+  await page.selectOption('.language select', 'fr');
+  assert.equal(await page.getAttribute('html', 'lang'), 'fr');
+  assert.equal(await page.locator('h1').innerText(), 'Nouvelle évaluation');
+  await page.fill('#left-R1', '7.1');
+  assert.equal(await text_of('left', 'R1'), '= 7,1 mm');
+  await assert_accessible(page, 'the French form');
+  await page.selectOption('.language select', 'de');
+  assert.equal(await page.locator('h1').innerText(), 'Neue Auswertung');
+  await page.reload();
+  assert.equal(await page.locator('h1').innerText(), 'Neue Auswertung');
+});
+
+test('the form waits for the limits and offers to try again', async () => {
+  await page.route('**/v1/parameters', (route) => route.abort());
+  await page.reload();
+  await page.getByRole('button', { name: 'Try again' }).waitFor();
+  await assert_accessible(page, 'the form without limits');
+  await page.unroute('**/v1/parameters');
+  await page.click('text=Try again');
+  await page.locator('fieldset.side').first().waitFor();
+});
+
+test('an earlier assessment can be changed and computed again', async () => {
+  await fill_side(page, 'right');
+  await page.fill('#subject', 'again-1');
+  await submit_and_wait(page, 1);
+  await page.click('text=Change and compute again');
+  await page.waitForFunction(() => document.querySelector('#right-R1')?.value === '6.9');
+  assert.equal(await page.inputValue('#subject'), 'again-1');
+  assert.equal(await page.inputValue('#left-R1'), '');
+});

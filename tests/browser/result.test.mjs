@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The result page: progress, outcome, recovery, cancel, comparison, history, lists, paper.
+import assert from 'node:assert/strict';
+import { mkdtemp, readFile, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { execFileSync } from 'node:child_process';
+import { after, afterEach, before, beforeEach, test } from 'node:test';
+import {
+  assert_accessible,
+  assert_clean,
+  fill_side,
+  open_form,
+  stage,
+  submit_and_wait,
+} from './browser.mjs';
+
+let s, page;
+before(async () => {
+  s = await stage();
+});
+after(() => s.finish());
+beforeEach(async () => {
+  page = await s.page();
+});
+afterEach(async () => {
+  assert_clean(page);
+  await page.context().close();
+});
+
+async function compute(subject, sides = ['left', 'right'], options = {}) {
+  await open_form(page, s.origin);
+  await page.fill('#subject', subject);
+  if (options.measured_at) await page.fill('#measured_at', options.measured_at);
+  for (const side of sides) await fill_side(page, side, options[side]);
+  await page.click('button[type=submit]');
+  await page.waitForURL('**/assessments/**');
+}
+
+const all_ended = (n) =>
+  page.waitForFunction((k) => document.querySelectorAll('.glance').length === k, n);
+
+test('both sides: outcome in words, volumes, forces, error, caveats in sight', async () => {
+  await compute('P-1');
+  await all_ended(2);
+  const card = page.getByRole('region', { name: 'Left', exact: true });
+  const text = await card.innerText();
+  for (const part of [
+    /Both thresholds crossed/,
+    /14\s400\smm³, 9\.7\s%/,
+    /1\.243 ± 0\.011/,
+    /from 33 N, 13\s% of the 258 N/,
+    /centred 6\.4 mm below/,
+  ])
+    assert.match(text, part);
+  for (const caveat of [
+    'animal experiments',
+    'reads higher',
+    'Never compare',
+    'Not a medical device',
+  ])
+    assert.ok(await page.locator('.caveats', { hasText: caveat }).isVisible(), caveat);
+  assert.match(await page.locator('#announcer').innerText(), /Both thresholds crossed/);
+  await assert_accessible(page, 'the result of both sides');
+});
+
+test('every band says what it means, by shape and word', async () => {
+  const words = {
+    below: 'Below both thresholds',
+    shear: 'Shear threshold crossed',
+    compression: 'Compression threshold crossed',
+  };
+  const drawn = new Set();
+  for (const [band, expected] of Object.entries(words)) {
+    await compute(`${band}-1`, ['left']);
+    await all_ended(1);
+    assert.equal(await page.locator('.verdict').first().innerText(), expected);
+    drawn.add(await page.locator('.glance .shape path').first().getAttribute('d'));
+    await assert_accessible(page, `the result ${band}`);
+  }
+  assert.equal(drawn.size, 3);
+  assert.match(await page.locator('.glance').innerText(), /not reached up to the 258 N/);
+});
+
+test('progress is followed, and cancel stops it', async () => {
+  await compute('slow-1', ['left']);
+  const bar = page.getByRole('progressbar');
+  await bar.waitFor();
+  await page.waitForFunction(() => document.querySelector('progress')?.value > 0);
+  assert.match(await page.locator('.running').innerText(), /load step \d+, iteration 3/);
+  await assert_accessible(page, 'a running assessment');
+  await page.click('text=Cancel');
+  await page.locator('.no-result').waitFor();
+  assert.match(await page.locator('.no-result').innerText(), /Cancelled/);
+  await assert_accessible(page, 'a cancelled assessment');
+});
+
+test('a failed solve shows the reason and no number', async () => {
+  await compute('fail-1', ['left']);
+  await all_ended(1);
+  const text = await page.locator('.card').innerText();
+  assert.match(text, /No result/);
+  assert.match(text, /last converged force is 143\.2 N/);
+  assert.equal(await page.locator('.curve, .caveats, .report').count(), 0);
+  await assert_accessible(page, 'a failed assessment');
+});
+
+test('the daemon restarts in the middle of a solve and the page recovers', async () => {
+  await compute('slow-2', ['left']);
+  await page.waitForFunction(() => document.querySelector('progress')?.value > 0);
+  await s.daemon.stop();
+  await page.locator('.lost').waitFor();
+  await assert_accessible(page, 'a page that lost its server');
+  await page.waitForTimeout(1200);
+  await s.daemon.start(s.daemon.port);
+  for (const d of s.daemon.documents.values()) if (d.subject === 'slow-2') d.subject = 'P-slow-2';
+  await all_ended(1);
+  assert.equal(await page.locator('.lost').count(), 0);
+  assert.match(await page.locator('.glance').innerText(), /Both thresholds crossed/);
+});
+
+test('an unknown assessment is said to be unknown', async () => {
+  await page.goto(`${s.origin}/assessments/0192f0c1-0000-7000-8000-ffffffffffff`);
+  await page.getByText('There is no such assessment.').waitFor();
+  await assert_accessible(page, 'an unknown assessment');
+});
+
+test('outside the studied range is said with the result', async () => {
+  await compute('P-2', ['left'], {
+    left: { R1: '7.1', R2: '22.8', eM: '31', eF: '10', muM: '12', muF: '5', F: '258' },
+  });
+  await all_ended(1);
+  assert.match(
+    await page.locator('.caveats').innerText(),
+    /Left: muM = 12 kPa is outside the range studied in the paper \(1 to 8\)/,
+  );
+});
+
+test('numbers stand in tables beside the charts', async () => {
+  await compute('P-3');
+  await all_ended(2);
+  const row = page.getByRole('row', { name: /peak pressure on the skin/ });
+  assert.match(await row.innerText(), /142\.3\skPa\s+142\.3\skPa\s+0\.0/);
+  const force = page.getByRole('row', { name: /Force on this side/ }).first();
+  assert.match(await force.innerText(), /258\sN\s+196\sN\s+−62/);
+  assert.equal(await page.locator('.curve').first().locator('tbody tr').count(), 13);
+  await assert_accessible(page, 'the result with its tables open');
+});
+
+test('history of the same subject, and the list, its filter and its comparison', async () => {
+  await compute('P-4', ['left'], { measured_at: '2026-01-10' });
+  await all_ended(1);
+  await compute('P-4', ['left'], { measured_at: '2026-03-10' });
+  await all_ended(1);
+  await page.locator('svg.history').waitFor();
+  assert.equal(await page.locator('section:has(#history) tbody tr').count(), 2);
+  await assert_accessible(page, 'the result with a history');
+
+  await page.click('text=Past assessments');
+  await page.locator('table.list').waitFor();
+  assert.ok((await page.locator('table.list tbody tr').count()) > 2);
+  await page.fill('#f-subject', 'P-4');
+  await page.click('text=Show');
+  await page.waitForURL('**/assessments?subject=P-4');
+  await page.waitForFunction(() => document.querySelectorAll('table.list tbody tr').length === 2);
+  await assert_accessible(page, 'the filtered list');
+  for (const box of await page.locator('table.list input').all()) await box.check();
+  await page.click('text=Compare the two selected');
+  await all_ended(2);
+  assert.equal(await page.locator('h1').innerText(), 'Comparison');
+  assert.deepEqual(await page.locator('.card h2').allInnerTexts(), ['A · Left', 'B · Left']);
+  assert.ok(await page.locator('h1').evaluate((e) => e === document.activeElement));
+  await assert_accessible(page, 'a comparison');
+});
+
+test('the list pages through what is older', async () => {
+  for (let i = 0; i < 55; i++)
+    s.daemon.add({
+      subject: 'cancelled-many',
+      side: 'left',
+      R1: 7,
+      R2: 20,
+      eM: 30,
+      eF: 10,
+      muM: 8,
+      muF: 5,
+      F: 200,
+    }).status = 'cancelled';
+  await page.goto(`${s.origin}/assessments?subject=cancelled-many`);
+  await page.getByRole('link', { name: 'Older' }).click();
+  await page.waitForFunction(() => document.querySelectorAll('table.list tbody tr').length === 5);
+  await page.getByRole('link', { name: 'Newest' }).click();
+  await page.waitForFunction(() => document.querySelectorAll('table.list tbody tr').length === 50);
+  await page.fill('#f-subject', 'nobody');
+  await page.click('text=Show');
+  await page.getByText('No assessment matches.').waitFor();
+  await assert_accessible(page, 'the empty list');
+});
+
+test('the report prints on one A4 page a side and says what it must', async () => {
+  await compute('P-5');
+  await all_ended(2);
+  const folder = await mkdtemp(join(tmpdir(), 'ischia-print-'));
+  try {
+    const file = join(folder, 'report.pdf');
+    await page.pdf({ path: file, preferCSSPageSize: true });
+    assert.match(
+      execFileSync('pdfinfo', [file], { encoding: 'utf8' }),
+      /Pages:\s+2\n[^]*Page size:\s+59\d\.\d+ x 84\d\.\d+/,
+    );
+    const text = execFileSync('pdftotext', ['-layout', file, '-'], { encoding: 'utf8' });
+    const first = text.split('\f')[0];
+    for (const part of [
+      /Tissue strain report · Left/,
+      /Subject P-5/,
+      /Both thresholds crossed/,
+      /22\.8\s+mm/,
+      /ε max\s+engineering\s+1\.243 ± 0\.011/,
+      /E shear\s+Green–Lagrange/,
+      /14\s400\s+9\.7\s%\s+1\s+33 N/,
+      /animal experiments/,
+      /Not a medical device/,
+      /Ischia 0\.0\.0/,
+      /macron2020-local 1/,
+      /0192f0c1-/,
+      /signature/,
+    ])
+      assert.match(first, part);
+    assert.doesNotMatch(text, /Change and compute again/);
+    assert.ok((await readFile(file)).length > 5000);
+  } finally {
+    await rm(folder, { recursive: true });
+  }
+});
+
+test('the list can be saved for a spreadsheet', async () => {
+  await page.route('**/v1/assessments?*', async (route) => {
+    if (!(await route.request().headerValue('accept')).includes('text/csv'))
+      return route.continue();
+    return route.fulfill({ contentType: 'text/csv', body: 'id,subject\n1,P-4\n' });
+  });
+  await page.goto(`${s.origin}/assessments`);
+  await page.locator('table.list').waitFor();
+  const [download] = await Promise.all([page.waitForEvent('download'), page.click('text=As CSV')]);
+  assert.equal(await readFile(await download.path(), 'utf8'), 'id,subject\n1,P-4\n');
+});
+
+test('nothing moves for those who asked for stillness', async () => {
+  await page.emulateMedia({ reducedMotion: 'reduce' });
+  await compute('P-6');
+  await all_ended(2);
+  const moving = await page.evaluate(
+    () =>
+      [...document.querySelectorAll('*')].filter((e) => {
+        const style = getComputedStyle(e);
+        return (
+          style.transitionDuration.split(',').some((d) => parseFloat(d) > 0) ||
+          style.animationName !== 'none'
+        );
+      }).length,
+  );
+  assert.equal(moving, 0);
+});
+
+test('a phone shows everything without sideways scrolling', async () => {
+  await page.setViewportSize({ width: 390, height: 844 });
+  await compute('P-7');
+  await all_ended(2);
+  for (const address of [page.url(), `${s.origin}/`, `${s.origin}/assessments`]) {
+    await page.goto(address);
+    await page.locator('h1').waitFor();
+    const [content, view] = await page.evaluate(() => [
+      document.documentElement.scrollWidth,
+      window.innerWidth,
+    ]);
+    assert.ok(content <= view, `${address}: ${content} > ${view}`);
+    await assert_accessible(page, `${address} on a phone`);
+  }
+});
