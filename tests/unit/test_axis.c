@@ -55,7 +55,7 @@ static void homogeneous_field_is_read_exactly(void **state)
     assert_near(s.raw, expected, 1e-14);
 }
 
-/* u_x = a X + b X^3 at one level: the slope on the axis is a, whatever b; the raw reading is not. */
+/* u_x = a X + b X^3 at one level: the slope on the axis is a, whatever b; the raw one is not. */
 static void cubic_field_peaks_where_it_should(void **state)
 {
     (void)state;

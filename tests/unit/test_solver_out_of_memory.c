@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * A solve with its 1st, 2nd, ... allocation failing, until one gets through: those of the mechanics,
- * of CHOLMOD and METIS alike. Each run ends with ISCHIA_E_MEMORY and leaves its outputs alone, or a
- * library could do without and the result has the same bits; nothing leaks.
+ * A solve with its 1st, 2nd, ... allocation failing, until one gets through: those of the
+ * mechanics, of CHOLMOD and METIS alike. Each run ends with ISCHIA_E_MEMORY and leaves its outputs
+ * alone, or a library could do without and the result has the same bits; nothing leaks.
  */
 #include <setjmp.h>
 #include <stdarg.h>
