@@ -79,7 +79,7 @@ enum ischia_code text_out_take(struct text_out *out, char **ret_text, size_t *re
 
 const char *text_from_number(double value, char buffer[TEXT_NUMBER_BYTES])
 {
-    assert(isfinite(value));
+    assert(buffer != NULL && isfinite(value));
     for (int digits = 15; digits <= 17; digits++) {
         (void)snprintf(buffer, TEXT_NUMBER_BYTES, "%.*g", digits, value);
         if (strtod(buffer, NULL) == value) break;

@@ -119,30 +119,40 @@ static void map_entries(struct assembly *a, const struct mesh *mesh, const struc
     }
 }
 
+static bool allocate(struct assembly *a, const struct mesh *mesh)
+{
+    const size_t nodes = (size_t)mesh->node_count, elements = (size_t)mesh->element_count;
+    a->equation = calloc(nodes, sizeof *a->equation);
+    a->scatter = malloc(elements * sizeof *a->scatter);
+    a->diagonal = malloc(nodes * sizeof *a->diagonal);
+    a->tangential = malloc(nodes * sizeof *a->tangential);
+    return a->equation && a->scatter && a->diagonal && a->tangential;
+}
+
+/* What is half made when it fails is the caller's to finish. */
+static enum ischia_code build(struct assembly *a, const struct mesh *mesh, struct pattern *pattern,
+                              struct ischia_error *err)
+{
+    static const char no_memory[] = "not enough memory for the equations";
+    CHECK(allocate(a, mesh), err, ISCHIA_E_MEMORY, "%s", no_memory);
+    number_equations(a, mesh);
+    CHECK(pattern_init(pattern, a, mesh), err, ISCHIA_E_MEMORY, "%s", no_memory);
+    map_entries(a, mesh, pattern);
+    return linear_create(&a->linear, a->n, pattern->start, pattern->row, err);
+}
+
 enum ischia_code assembly_init(struct assembly *ret, const struct mesh *mesh,
                                struct ischia_error *err)
 {
     struct assembly a = {0};
     struct pattern pattern = {0};
-    const size_t nodes = (size_t)mesh->node_count, elements = (size_t)mesh->element_count;
-    enum ischia_code code = FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the equations");
-    a.equation = calloc(nodes, sizeof *a.equation);
-    a.scatter = malloc(elements * sizeof *a.scatter);
-    a.diagonal = malloc(nodes * sizeof *a.diagonal);
-    a.tangential = malloc(nodes * sizeof *a.tangential);
-    if (!a.equation || !a.scatter || !a.diagonal || !a.tangential) goto out;
-    number_equations(&a, mesh);
-    if (!pattern_init(&pattern, &a, mesh)) goto out;
-    map_entries(&a, mesh, &pattern);
-    code = linear_create(&a.linear, a.n, pattern.start, pattern.row, err);
-out:
+    const enum ischia_code code = build(&a, mesh, &pattern, err);
     pattern_finish(&pattern);
-    if (code != ISCHIA_OK) {
+    if (code == ISCHIA_OK)
+        *ret = a;
+    else
         assembly_finish(&a);
-        return code;
-    }
-    *ret = a;
-    return ISCHIA_OK;
+    return code;
 }
 
 void assembly_finish(struct assembly *a)
@@ -152,9 +162,5 @@ void assembly_finish(struct assembly *a)
     free(a->diagonal);
     free(a->tangential);
     linear_destroy(a->linear);
-    a->equation = NULL;
-    a->scatter = NULL;
-    a->diagonal = NULL;
-    a->tangential = NULL;
-    a->linear = NULL;
+    *a = (struct assembly){0};
 }

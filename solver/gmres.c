@@ -50,8 +50,9 @@ static void rotate_column(struct arnoldi *a, int k)
         a->h[i + 1][k] = -a->s[i] * upper + a->c[i] * lower;
     }
     const double r = hypot(a->h[k][k], a->h[k + 1][k]);
-    a->c[k] = r > 0 ? a->h[k][k] / r : 1;
-    a->s[k] = r > 0 ? a->h[k + 1][k] / r : 0;
+    /* r = 0: A is singular and the direction worth nothing; the residual must stay what it was. */
+    a->c[k] = r > 0 ? a->h[k][k] / r : 0;
+    a->s[k] = r > 0 ? a->h[k + 1][k] / r : 1;
     a->h[k][k] = r;
     a->g[k + 1] = -a->s[k] * a->g[k];
     a->g[k] *= a->c[k];

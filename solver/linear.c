@@ -28,8 +28,31 @@ static void common_init(cholmod_common *common)
     common->final_ll = 1;
     common->print = 0;
     common->nmethods = 1;
-    common->method[0].ordering = CHOLMOD_METIS;
+    common->method[0].ordering = CHOLMOD_GIVEN;
     common->postorder = 1;
+}
+
+/*
+ * The analysis with METIS' ordering. METIS is called apart from it, because CHOLMOD ignores METIS'
+ * failures: without memory it would go on with whatever the permutation held. It is filled with
+ * what is no permutation instead, and must be one afterwards. Nor may the analysis take up another
+ * ordering when memory fails it: the solution's last bits would differ.
+ */
+static void analyse(struct linear *l)
+{
+    cholmod_common *common = &l->common;
+    const size_t n = l->A->ncol;
+    int *order = malloc(n * sizeof *order);
+    common->status = CHOLMOD_OUT_OF_MEMORY;
+    if (order == NULL) return;
+    memset(order, 0xff, n * sizeof *order);
+    const bool ordered =
+        cholmod_metis(l->A, NULL, 0, 0, order, common) && cholmod_check_perm(order, n, n, common);
+    if (ordered) l->L = cholmod_analyze_p(l->A, order, NULL, 0, common);
+    const bool kept = l->L != NULL && l->L->ordering == CHOLMOD_GIVEN;
+    if (!kept && (common->status == CHOLMOD_OK || common->status == CHOLMOD_INVALID))
+        common->status = CHOLMOD_OUT_OF_MEMORY;
+    free(order);
 }
 
 static bool pattern_init(struct linear *l, int n, const int *start, const int *row)
@@ -42,7 +65,7 @@ static bool pattern_init(struct linear *l, int n, const int *start, const int *r
     memset(l->A->x, 0, sizeof(double) * nnz);
     l->masked = cholmod_copy_sparse(l->A, &l->common);
     if (l->masked == NULL) return false;
-    l->L = cholmod_analyze(l->A, &l->common);
+    analyse(l);
     return l->L != NULL && l->common.status == CHOLMOD_OK;
 }
 
@@ -53,10 +76,11 @@ enum ischia_code linear_create(struct linear **ret, int n, const int *start, con
     CHECK(l != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the linear solver");
     common_init(&l->common);
     if (!pattern_init(l, n, start, row)) {
-        const bool memory = l->common.status == CHOLMOD_OUT_OF_MEMORY;
+        const int status = l->common.status;
         linear_destroy(l);
-        return FAIL(err, memory ? ISCHIA_E_MEMORY : ISCHIA_E_NUMERIC,
-                    "the analysis of a matrix of %d columns failed", n);
+        CHECK(status != CHOLMOD_OUT_OF_MEMORY, err, ISCHIA_E_MEMORY,
+              "not enough memory to analyse %d equations", n);
+        return FAIL(err, ISCHIA_E_NUMERIC, "CHOLMOD could not analyse (status %d)", status);
     }
     *ret = l;
     return ISCHIA_OK;
@@ -105,9 +129,21 @@ enum ischia_code linear_factor(struct linear *l, const unsigned char *keep,
     return ISCHIA_OK;
 }
 
+/* Makes what cholmod_solve2 works with, because it does not notice when it cannot. */
+static bool reserve_solution(struct linear *l, size_t count)
+{
+    const size_t n = l->A->nrow;
+    cholmod_common *c = &l->common;
+    return cholmod_ensure_dense(&l->solution, n, count, n, CHOLMOD_REAL, c) != NULL &&
+           cholmod_ensure_dense(&l->work_y, n, count, n, CHOLMOD_REAL, c) != NULL &&
+           cholmod_ensure_dense(&l->work_e, count, l->L->maxesize, count, CHOLMOD_REAL, c) != NULL;
+}
+
 enum ischia_code linear_solve(struct linear *l, int count, double *x, struct ischia_error *err)
 {
     const size_t n = l->A->nrow;
+    CHECK(reserve_solution(l, (size_t)count), err, ISCHIA_E_MEMORY,
+          "not enough memory to solve %zu equations", n);
     cholmod_dense b = {.nrow = n,
                        .ncol = (size_t)count,
                        .nzmax = n * (size_t)count,

@@ -57,11 +57,12 @@ struct local_geometry {
     double rim[RIM_SAMPLES + 1][2]; /* outline of the bone in the box top, even in arc length   */
 };
 
-/* x of the bone's outline in the plane z = top at a given y. */
+/* x of the bone's outline in the plane z = top at a given y; like the tube's sides, its ends go
+ * straight up from where the bone is widest. */
 static double outline_x(const struct local_geometry *g, double y)
 {
     const double tube = g->R2c + sqrt(fmax(0, g->R1 * g->R1 - y * y));
-    const double depth = g->R2c + g->R1 - (g->top_z - g->tip_z);
+    const double depth = fmax(0, g->R2c + g->R1 - (g->top_z - g->tip_z));
     return sqrt(fmax(0, tube * tube - depth * depth));
 }
 

@@ -174,7 +174,7 @@ static void put_corners(struct sink *sink)
 {
     const struct design *d = sink->design;
     int number[DESIGN_FACTORS_MAX] = {0}, radix[DESIGN_FACTORS_MAX];
-    double x[DESIGN_FACTORS_MAX];
+    double x[DESIGN_FACTORS_MAX] = {0};
     for (int f = 0; f < d->factor_count; f++) radix[f] = 2;
     do {
         for (int f = 0; f < d->factor_count; f++) x[f] = 2 * number[f] - 1;

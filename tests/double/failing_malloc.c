@@ -2,12 +2,14 @@
 #include "tests/double/failing_malloc.h"
 
 #include <errno.h>
+#include <malloc.h>
 #include <stddef.h>
 #include <stdlib.h>
 
 extern void *__libc_malloc(size_t size);
 extern void *__libc_calloc(size_t count, size_t size);
 extern void *__libc_realloc(void *old, size_t size);
+extern void *__libc_memalign(size_t alignment, size_t size);
 extern void __libc_free(void *memory);
 
 static long armed;    /* how many allocations until one fails; 0: none is to fail */
@@ -48,6 +50,14 @@ void *realloc(void *old, size_t size)
     if (fails()) return NULL;
     void *memory = __libc_realloc(old, size);
     live += old == NULL && memory != NULL;
+    return memory;
+}
+
+/* Never made to fail: only libgomp asks for it, and ends the program when it is refused. */
+void *memalign(size_t alignment, size_t size)
+{
+    void *memory = __libc_memalign(alignment, size);
+    live += memory != NULL;
     return memory;
 }
 

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "solver/path.h"
+#include "tests/unit/near.h"
+#include "tests/verification/bodies.h"
+
+static const double size_mm[3] = {10, 10, 10};
+
+/* Parts point to each other, so it must not be copied. */
+static void bench_make(struct bench *b)
+{
+    static const struct element_material tissue = {0.005, 0.5, 0.025};
+    const struct element_material material[TISSUE_COUNT] = {tissue, tissue, tissue};
+    struct ischia_error err;
+    *b = (struct bench){0};
+    if (block_init(&b->mesh, size_mm, (const int[3]){3, 3, 3}, NODE_ON_BONE, &err) != ISCHIA_OK ||
+        bench_init(b, material, 0.3, &err) != ISCHIA_OK)
+        fail_msg("%s", err.message);
+    b->mesh.tip_z_mm = size_mm[2];
+}
+
+/* What the observer is told, and when it is to stop. */
+struct log {
+    int steps, iterations, load_step;
+    double d_mm, force_N;
+    int cancel_at_iteration, fail_at_step; /* < 0: never */
+};
+
+static bool on_iteration(void *context, int load_step, int newton_iteration, double force_N)
+{
+    struct log *l = context;
+    assert_true(isfinite(force_N) && newton_iteration >= 0);
+    assert_true(load_step == l->steps + 1 && load_step >= l->load_step);
+    l->load_step = load_step;
+    return l->iterations++ != l->cancel_at_iteration;
+}
+
+static enum ischia_code on_step(void *context, const struct equilibrium *state,
+                                struct ischia_error *err)
+{
+    struct log *l = context;
+    CHECK(l->steps != l->fail_at_step, err, ISCHIA_E_IO, "the log is full");
+    assert_true(state->d_mm > l->d_mm && state->force_N > 0);
+    l->d_mm = state->d_mm;
+    l->force_N = state->force_N;
+    l->steps++;
+    return ISCHIA_OK;
+}
+
+static enum ischia_code follow(struct bench *b, double force_N, struct log *log,
+                               struct path_report *ret_report, struct ischia_error *err)
+{
+    const struct path_observer observer = {on_iteration, on_step, log};
+    return path_follow(&b->body, &b->assembly, &b->seat, force_N, log != NULL ? &observer : NULL,
+                       &b->state, ret_report, err);
+}
+
+static void path_ends_at_the_force(void **state)
+{
+    (void)state;
+    static const double forces[] = {0.3, 1, 3};
+    for (size_t i = 0; i < sizeof forces / sizeof forces[0]; i++) {
+        struct bench b;
+        struct log log = {.cancel_at_iteration = -1, .fail_at_step = -1};
+        struct path_report report;
+        struct ischia_error err = {.message = "as it was"};
+        bench_make(&b);
+        if (follow(&b, forces[i], &log, &report, &err) != ISCHIA_OK) fail_msg("%s", err.message);
+        assert_string_equal(err.message, "as it was");
+        assert_int_equal(report.reason, ISCHIA_CONVERGED);
+        assert_near(b.state.force_N / forces[i], 1, 1e-8);
+        assert_near(report.last_force_N / forces[i], 1, 1e-8);
+        assert_true(report.force_residual <= 1e-8);
+        assert_true(fabs(report.energy_residual) < 0.01);
+        assert_true(log.steps == report.load_steps && report.load_steps >= 1);
+        assert_true(log.force_N == b.state.force_N && log.d_mm == b.state.d_mm);
+        assert_true(report.newton_iterations > 0 && report.factorisations > 0);
+        bench_finish(&b);
+    }
+}
+
+static void watching_changes_nothing(void **state)
+{
+    (void)state;
+    struct bench a, b;
+    struct log log = {.cancel_at_iteration = -1, .fail_at_step = -1};
+    struct path_report seen, unseen;
+    bench_make(&a);
+    bench_make(&b);
+    assert_int_equal(follow(&a, 0.5, &log, &seen, NULL), ISCHIA_OK);
+    assert_int_equal(follow(&b, 0.5, NULL, &unseen, NULL), ISCHIA_OK);
+    assert_memory_equal(a.state.u_mm, b.state.u_mm,
+                        (size_t)a.mesh.node_count * sizeof *a.state.u_mm);
+    assert_true(seen.energy_residual == unseen.energy_residual);
+    bench_finish(&a);
+    bench_finish(&b);
+}
+
+static void observers_end_the_path(void **state)
+{
+    (void)state;
+    static const struct {
+        int iteration, step;
+        enum ischia_code code;
+    } ends[] = {{0, -1, ISCHIA_E_CANCELLED}, {5, -1, ISCHIA_E_CANCELLED}, {-1, 2, ISCHIA_E_IO}};
+    for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
+        struct bench b;
+        struct log log = {.cancel_at_iteration = ends[i].iteration, .fail_at_step = ends[i].step};
+        struct path_report report = {.load_steps = -7};
+        struct ischia_error err = {0};
+        bench_make(&b);
+        assert_int_equal(follow(&b, 0.5, &log, &report, &err), ends[i].code);
+        assert_int_equal(err.code, ends[i].code);
+        assert_int_equal(report.load_steps, -7); /* untouched */
+        if (ends[i].iteration >= 0) assert_int_equal(log.iterations, ends[i].iteration + 1);
+        bench_finish(&b);
+    }
+}
+
+/* A force that flattens the block beyond what its elements can follow: a reason, not an error, and
+ * the state is the last that converged. */
+static void what_cannot_be_reached_has_a_reason(void **state)
+{
+    (void)state;
+    struct bench b;
+    struct log log = {.cancel_at_iteration = -1, .fail_at_step = -1};
+    struct path_report report;
+    struct ischia_error err;
+    bench_make(&b);
+    if (follow(&b, 1e9, &log, &report, &err) != ISCHIA_OK) fail_msg("%s", err.message);
+    assert_true(report.reason < 0);
+    assert_true(strlen(report.tried) > 10);
+    assert_true(report.last_force_N > 0 && report.last_force_N < 1e9);
+    assert_near(b.state.d_mm, log.d_mm, 0);
+    assert_true(b.state.force_N == log.force_N && report.last_force_N >= log.force_N);
+    assert_true(body_det_F_min(&b.body, (const double(*)[3])b.state.u_mm) > 0);
+    bench_finish(&b);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(path_ends_at_the_force),
+        cmocka_unit_test(watching_changes_nothing),
+        cmocka_unit_test(observers_end_the_path),
+        cmocka_unit_test(what_cannot_be_reached_has_a_reason),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
