@@ -81,7 +81,7 @@ static bool pattern_init(struct pattern *ret, const struct assembly *a, const st
     if (loose == NULL || place == NULL || ret->start == NULL) goto out;
     visit_entries(a, mesh, place, NULL);
     for (int j = 0; j < a->n; j++) loose[j + 1] = loose[j] + place[j];
-    ret->row = malloc(sizeof(int) * (size_t)loose[n]);
+    ret->row = malloc(sizeof(int) * ((size_t)loose[n] + 1)); /* never of no bytes */
     if (ret->row == NULL) goto out;
     memcpy(place, loose, sizeof *place * (n + 1));
     visit_entries(a, mesh, place, ret->row);

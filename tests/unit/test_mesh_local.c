@@ -376,8 +376,9 @@ static void put_muscle(const struct mesh *m, double (*field)[3])
             for (int cell = 0; cell < rows * d->across; cell++, e++)
                 for (int corner = 0; corner < 8; corner++) {
                     const int *s = step[p == PATCH_X][corner % 4];
-                    const double a = (double)(cell % d->across + s[0]) / d->across;
-                    const double b = (double)(cell / d->across + s[1]) / rows;
+                    const int i = cell % d->across, j = cell / d->across;
+                    const double a = (i + s[0]) / (double)d->across;
+                    const double b = (j + s[1]) / (double)rows;
                     const double share = (double)(corner < 4 ? l + 1 : l) / d->radial;
                     put(field[m->hex[e][corner]], p, a, b, 0, share);
                 }
@@ -393,8 +394,9 @@ static void put_columns(const struct mesh *m, double (*field)[3])
         for (int cell = 0; cell < d->across * d->across; cell++, e++)
             for (int corner = 0; corner < 8; corner++) {
                 const int *s = step[corner % 4];
-                const double a = (double)(cell % d->across + s[0]) / d->across;
-                const double b = (double)(cell / d->across + s[1]) / d->across;
+                const int i = cell % d->across, j = cell / d->across;
+                const double a = (i + s[0]) / (double)d->across;
+                const double b = (j + s[1]) / (double)d->across;
                 const int depth = corner < 4 ? layer + 1 : layer;
                 if (depth <= d->fat)
                     put(field[m->hex[e][corner]], CORE, a, b, 1, (double)depth / d->fat);

@@ -156,7 +156,7 @@ static void tangent_is_the_derivative_of_equilibria(void **state)
     double *rate = calloc(nodes, sizeof *rate), *normal = calloc(nodes, sizeof *normal);
     assert_true(direction && u && rate && normal);
     struct newton_tangent tangent = {.direction = direction, .normal_rate_N_mm = rate};
-    for (double d = 0.5; d <= at; d += 0.5) press_to(&b, d);
+    for (int step = 1; step <= 4; step++) press_to(&b, at * step / 4);
     newton_linearise(b.newton, &b.state);
     if (newton_tangent(b.newton, &tangent, &err) != ISCHIA_OK) fail_msg("%s", err.message);
     press_to(&b, at - h);
