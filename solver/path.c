@@ -116,7 +116,7 @@ static enum ischia_code book(struct path *p, struct ischia_error *err)
     memcpy(p->u_mm, p->state->u_mm, sizeof *p->u_mm * (size_t)p->nodes);
     memcpy(p->normal_N, p->seat->normal_N, sizeof *p->normal_N * (size_t)p->nodes);
     p->report->load_steps++;
-    p->report->last_force_N = fmax(p->report->last_force_N, now.force_N);
+    p->report->last_force_N = fmax(p->report->last_force_N, fmin(now.force_N, p->target_N));
     if (p->observer == NULL || p->observer->on_step == NULL) return ISCHIA_OK;
     return p->observer->on_step(p->observer->context, p->state, err);
 }

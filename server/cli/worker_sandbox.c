@@ -45,16 +45,22 @@ static const int fatal[] = {
     SCMP_SYS(bind),   SCMP_SYS(ptrace),   SCMP_SYS(fork),   SCMP_SYS(vfork),
 };
 
+/* Allows a call whose first argument is `value`. The library's SCMP_A0 leaves a field out, which
+ * clang warns about. */
+static int allow_with_first(scmp_filter_ctx filter, int call, scmp_datum_t value)
+{
+    const struct scmp_arg_cmp first = {.arg = 0, .op = SCMP_CMP_EQ, .datum_a = value, .datum_b = 0};
+    return seccomp_rule_add_array(filter, SCMP_ACT_ALLOW, call, 1, &first);
+}
+
 static int allow_on(scmp_filter_ctx filter, int call, int descriptor)
 {
-    return seccomp_rule_add(filter, SCMP_ACT_ALLOW, call, 1,
-                            SCMP_A0(SCMP_CMP_EQ, (scmp_datum_t)descriptor));
+    return allow_with_first(filter, call, (scmp_datum_t)descriptor);
 }
 
 static int allow_to_itself(scmp_filter_ctx filter)
 {
-    return seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(tgkill), 1,
-                            SCMP_A0(SCMP_CMP_EQ, (scmp_datum_t)getpid()));
+    return allow_with_first(filter, SCMP_SYS(tgkill), (scmp_datum_t)getpid());
 }
 
 static int fill(scmp_filter_ctx filter, int socket)

@@ -473,7 +473,7 @@ class Routes(unittest.TestCase):
             page = answer.body.decode()
             self.assertEqual(re.findall(r'(?:src|href)="(?!/|#)[^"]*"', page), [], path)
             self.assertEqual(
-                re.findall(r'<script(?! src=)|<style|\son\w+=|style="', page), [], path
+                re.findall(r'<script(?!(?: type="module")? src=)|<style|\son\w+=|style="', page), [], path
             )
             for name in re.findall(r'(?:src|href)="(/assets/[^"]*)"', page):
                 self.assertEqual(self.service.get(name).status, 200, name)
