@@ -23,10 +23,11 @@
 
 #include "solver/gmres.h"
 
-/* Armijo's constant; the shortest step tried; potential changes below this share of the elastic
- * energy are rounding and say nothing about descent. */
+/* Armijo's constant; the shortest and the longest step tried, over a Newton step; potential changes
+ * below this share of the elastic energy are rounding and say nothing about descent. */
 static const double armijo = 1e-4;
 static const double step_min = 1e-6;
+static const double reach_max = 256;
 static const double energy_rounding = 1e-12;
 /* The lagged limits are renewed once the rest of the residual is this share of the whole. */
 static const double relag_share = 0.1;
@@ -72,6 +73,7 @@ struct newton {
     double residual;   /* with the contact forces of the present iterate                    */
     double lagged_residual;
     bool force_controlled;
+    bool convexified; /* the factored tangent is not the exact one */
 };
 
 enum ischia_code newton_create(struct newton **ret, struct body *body, struct assembly *assembly,
@@ -321,6 +323,7 @@ static enum ischia_code factor_definite(struct newton *w, const struct equilibri
     *ret_definite = false;
     for (size_t i = 0; i < rungs && !*ret_definite; i++) {
         if (i > 0) linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[i], control);
+        w->convexified = i > 0;
         TRY(factor(w, report, ret_definite, err));
     }
     return ISCHIA_OK;
@@ -368,19 +371,43 @@ static double potential(const struct newton *w, const double (*u)[3], double d_m
            (control->force_controlled ? control->force_N * d_mm : 0);
 }
 
+static double potential_at(struct newton *w, const struct equilibrium *state, double alpha,
+                           const struct newton_control *control, double *ret_slope)
+{
+    const double(*trial)[3] = (const double(*)[3])w->trial;
+    *ret_slope = move(w, state, alpha, control);
+    return potential(w, trial, state->d_mm + alpha * w->direction[w->n], control,
+                     body_energy(w->body, trial));
+}
+
+/* Doubles a full step for as long as the potential goes on falling. A tangent that had to be made
+ * convex knows nothing of the way down from an unstable state: its steps are far too short. */
+static double reach_out(struct newton *w, const struct equilibrium *state,
+                        const struct newton_control *control, double after)
+{
+    double alpha = 1, slope;
+    while (alpha < reach_max) {
+        const double further = potential_at(w, state, 2 * alpha, control, &slope);
+        if (!(further < after)) break;
+        after = further;
+        alpha *= 2;
+    }
+    (void)move(w, state, alpha, control);
+    return alpha;
+}
+
 /* Backtracks until the potential falls enough; false when it never does. */
 static bool line_search(struct newton *w, struct equilibrium *state,
                         const struct newton_control *control)
 {
-    const double(*trial)[3] = (const double(*)[3])w->trial;
     const double before =
         potential(w, (const double(*)[3])state->u_mm, state->d_mm, control, w->elastic_Nmm);
     const double noise = energy_rounding * fabs(w->elastic_Nmm);
     for (double alpha = 1; alpha >= step_min; alpha /= 2) {
-        const double slope = move(w, state, alpha, control);
-        const double d = state->d_mm + alpha * w->direction[w->n];
-        const double after = potential(w, trial, d, control, body_energy(w->body, trial));
+        double slope;
+        const double after = potential_at(w, state, alpha, control, &slope);
         if (after > before + armijo * slope + noise) continue;
+        if (alpha >= 1 && w->convexified) alpha = reach_out(w, state, control, after);
         accept(w, state, alpha);
         return true;
     }

@@ -15,12 +15,21 @@ static const double step_of_height = 0.08;    /* of the unloaded height         
 static const double step_of_remaining = 0.18; /* of the height that is left         */
 static const double first_step = 0.01;        /* of the unloaded height             */
 static const double step_floor = 1e-4;        /* of the unloaded height: give up    */
+/* A step this small that does not converge soon is not too long: the tissue snaps to another fold
+ * there, and the way down needs many iterations. */
+static const double snap_step = 0.005;
 static const double path_tolerance = 1e-5;
 static const double final_tolerance = 1e-8;
 /* How much more force a step may bring than its tangent says. */
 static const double stiffening = 1.5;
 static const double residual_scale_floor = 0.02; /* of the target force: scale near rest */
-enum { PATH_ITERATIONS_MAX = 30, FINAL_ITERATIONS_MAX = 60, LOAD_STEPS_MAX = 100, TRIES_MAX = 200 };
+enum {
+    PATH_ITERATIONS_MAX = 30,
+    SNAP_ITERATIONS_MAX = 300,
+    FINAL_ITERATIONS_MAX = 60,
+    LOAD_STEPS_MAX = 100,
+    TRIES_MAX = 200
+};
 
 struct path {
     struct body *body;
@@ -137,10 +146,11 @@ static enum ischia_code try_step(struct path *p, double dd, bool *ret_final,
 {
     const double missing_N = p->target_N - p->last.force_N;
     const double k = p->last.stiffness_N_mm;
-    struct newton_control control = {.force_N =
-                                         fmax(p->last.force_N, residual_scale_floor * p->target_N),
-                                     .tolerance = path_tolerance,
-                                     .iterations_max = PATH_ITERATIONS_MAX};
+    struct newton_control control = {
+        .force_N = fmax(p->last.force_N, residual_scale_floor * p->target_N),
+        .tolerance = path_tolerance,
+        .iterations_max =
+            dd < snap_step * p->height_mm ? SNAP_ITERATIONS_MAX : PATH_ITERATIONS_MAX};
     *ret_final = k > 0 && missing_N <= stiffening * k * dd;
     if (*ret_final) {
         control = (struct newton_control){.force_controlled = true,

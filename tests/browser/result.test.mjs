@@ -87,7 +87,8 @@ test('progress is followed, and cancel stops it', async () => {
   const bar = page.getByRole('progressbar');
   await bar.waitFor();
   await page.waitForFunction(() => document.querySelector('progress')?.value > 0);
-  assert.match(await page.locator('.running').innerText(), /load step \d+, iteration 3/);
+  /* The words follow the bar with the next event. */
+  await page.locator('.running', { hasText: /load step \d+, iteration 3/ }).waitFor();
   await assert_accessible(page, 'a running assessment');
   await page.click('text=Cancel');
   await page.locator('.no-result').waitFor();

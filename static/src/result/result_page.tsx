@@ -154,7 +154,11 @@ export function ResultPage(props: { ids: string[] }) {
   const parameters = use_parameters();
   const documents = states.flatMap((s) => (s.document ? [s.document] : []));
   const complete = documents.length === ids.length;
-  const names = complete ? column_names(documents) : ids.map(() => t('result.title'));
+  /* Until the documents are here nothing tells two cards apart but their place. */
+  const numbered = (i: number): string => (ids.length > 1 ? ` ${i + 1}` : '');
+  const names = complete
+    ? column_names(documents)
+    : ids.map((_, i) => t('result.title') + numbered(i));
   use_announcement(complete ? states : [], names);
   const done = finished(documents);
   const inputs = parameters?.inputs ?? [];
