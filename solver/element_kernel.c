@@ -251,31 +251,34 @@ LANES_INLINE void turned_tangent(const struct ogden_tangent *d, lanes U[3][3], l
     }
 }
 
-/* Adds to rows (i, a) and columns (k, b) of the lower triangle. */
-LANES_INLINE void add_block(lanes A[3][3], lanes n[3][HEX_NODES], int i, int k, int at,
-                            double stiffness[HEX_ENTRIES][BATCH])
+/* ret_Q = sum_P n_P A_PQ of node a. */
+LANES_INLINE void left_product(lanes A[3][3], lanes n[3][HEX_NODES], int a, lanes ret[3])
 {
-    for (int a = 0; a < HEX_NODES; a++) {
-        lanes left[3];
-        double(*row)[BATCH] = stiffness + row_start(i * HEX_NODES + a) + k * HEX_NODES;
-        for (int q = 0; q < 3; q++)
-            left[q] = n[0][a] * A[0][q] + n[1][a] * A[1][q] + n[2][a] * A[2][q];
-        const int columns = i == k ? a + 1 : HEX_NODES;
-        for (int b = 0; b < columns; b++)
-            lanes_store(row[b] + at,
-                        lanes_load(row[b] + at) +
-                            (left[0] * n[0][b] + left[1] * n[1][b] + left[2] * n[2][b]));
-    }
+    for (int q = 0; q < 3; q++) ret[q] = n[0][a] * A[0][q] + n[1][a] * A[1][q] + n[2][a] * A[2][q];
 }
 
+/* Adds left . n_b to the first columns of a row. */
+LANES_INLINE void add_row(const lanes left[3], lanes n[3][HEX_NODES], int columns, int at,
+                          double row[][BATCH])
+{
+    for (int b = 0; b < columns; b++)
+        lanes_store(row[b] + at, lanes_load(row[b] + at) +
+                                     (left[0] * n[0][b] + left[1] * n[1][b] + left[2] * n[2][b]));
+}
+
+/* Rows (i, a), columns (k, b) of the lower triangle: all where i > k, b <= a where i = k. */
 LANES_INLINE void add_stiffness(const struct ogden_tangent *d, lanes U[3][3], lanes weight,
                                 lanes n[3][HEX_NODES], int at, double stiffness[HEX_ENTRIES][BATCH])
 {
     for (int i = 0; i < 3; i++)
         for (int k = 0; k <= i; k++) {
-            lanes A[3][3];
+            lanes A[3][3], left[3];
             turned_tangent(d, U, weight, i, k, A);
-            add_block(A, n, i, k, at, stiffness);
+            for (int a = 0; a < HEX_NODES; a++) {
+                left_product(A, n, a, left);
+                double(*row)[BATCH] = stiffness + row_start(i * HEX_NODES + a) + k * HEX_NODES;
+                add_row(left, n, i == k ? a + 1 : HEX_NODES, at, row);
+            }
         }
 }
 

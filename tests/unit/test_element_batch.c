@@ -77,11 +77,18 @@ static void run(const struct element_kernel *kernel, int shift, double convexity
     compute(kernel, ret);
 }
 
+static uint64_t bits(double x)
+{
+    uint64_t ret;
+    memcpy(&ret, &x, sizeof ret);
+    return ret;
+}
+
 static void same(const char *what, const double *a, int lane_a, const double *b, int lane_b,
                  int count)
 {
     for (int i = 0; i < count; i++)
-        if (memcmp(&a[i * BATCH + lane_a], &b[i * BATCH + lane_b], sizeof *a) != 0)
+        if (bits(a[i * BATCH + lane_a]) != bits(b[i * BATCH + lane_b]))
             fail_msg("%s %d is %.17g in lane %d, %.17g in lane %d", what, i, a[i * BATCH + lane_a],
                      lane_a, b[i * BATCH + lane_b], lane_b);
 }
