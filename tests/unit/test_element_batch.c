@@ -189,7 +189,8 @@ static void check_column(const struct run *at, int node, int component)
                     (up.d.pressure_MPa[l] - down.d.pressure_MPa[l]) / (2 * h) * at->batch.volume[l],
                     1e-6);
         for (int p = q; p < HEX_DOFS; p++) {
-            const double *plus = up.d.force[0][p], *minus = down.d.force[0][p];
+            const int c = p / HEX_NODES, n = p % HEX_NODES;
+            const double *plus = up.d.force[c][n], *minus = down.d.force[c][n];
             assert_near(at->d.stiffness[p * (p + 1) / 2 + q][l], (plus[l] - minus[l]) / (2 * h),
                         2e-6);
         }
