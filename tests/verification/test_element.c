@@ -44,7 +44,7 @@ static void distorted_patch(struct bench *b, double bulk_ratio, double point_sha
 {
     const int m[3] = {PATCH, PATCH, PATCH};
     const struct element_material soft = {0.005, 0.005 * bulk_ratio,
-                                          0.005 * bulk_ratio * point_share};
+                                          0.005 * bulk_ratio * point_share, 0};
     const struct element_material material[TISSUE_COUNT] = {soft, soft, soft};
     struct ischia_error err;
     uint32_t seed = 7;
@@ -380,7 +380,7 @@ static double deflection_ratio(double bulk_ratio, double point_share)
     const double mu = 0.005, force_N = 1e-7;
     const double kappa = mu * bulk_ratio, E = 9 * kappa * mu / (3 * kappa + mu);
     const int m[3] = {4, 4, 48};
-    const struct element_material soft = {mu, kappa, kappa * point_share};
+    const struct element_material soft = {mu, kappa, kappa * point_share, 0};
     const struct element_material material[TISSUE_COUNT] = {soft, soft, soft};
     struct bench b = {0};
     struct ischia_error err;
