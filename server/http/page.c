@@ -161,8 +161,9 @@ static void put_sides(const struct form *form)
 static void put_form(const struct form *form)
 {
     page_put(form->out,
-             "<h1>Tissue under one ischium</h1>\n<p>Seven measured numbers of one side. A decimal "
-             "point, no comma.</p>\n<form method=\"post\" action=\"/v1/assessments\">\n");
+             "<h1>Tissue under one ischium</h1>\n<p>Seven measured numbers of one side, each "
+             "with a decimal point or a decimal comma.</p>\n<form method=\"post\" "
+             "action=\"/v1/assessments\">\n");
     put_other_faults(form);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) put_parameter(form, &ischia_params[i]);
     put_sides(form);

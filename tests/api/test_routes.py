@@ -173,6 +173,24 @@ class Routes(unittest.TestCase):
         wrong = self.service.ask('POST', '/v1/assessments', b'R1=99', kind)
         self.assertIn(('/R1', 'out_of_range'), self.errors(wrong))
 
+    def test_a_decimal_comma_is_a_form_s_alone(self):
+        kind = {'Content-Type': 'application/x-www-form-urlencoded'}
+        form = urllib.parse.urlencode({**SIDE, 'R1': '6,5', 'F': ' 209,5\u202f'}).encode()
+        answer = self.service.ask('POST', '/v1/assessments', form, kind)
+        self.assertEqual(answer.status, 303)
+        document = self.service.get(answer.headers['Location'].rsplit('/', 1)[0]).json()
+        self.assertEqual((document['parameters']['R1'], document['parameters']['F']), (6.5, 209.5))
+        form = urllib.parse.urlencode({**SIDE, 'R2': '1,234.5', 'eM': '31,,5'}).encode()
+        answer = self.service.ask('POST', '/v1/assessments', form, kind)
+        self.assertEqual(self.errors(answer), {('/R2', 'ambiguous'), ('/eM', 'ambiguous')})
+        in_words = 'R2 is "1,234.5" with more than one decimal mark; write 1234.5 or 1234,5'
+        self.assertEqual(answer.json()['errors'][0]['detail'], in_words)
+        answer = self.service.ask('POST', '/v1/assessments', side(R1='6,5'))
+        self.assertEqual(self.errors(answer), {('/R1', 'wrong_type')})
+        json = {'Content-Type': 'application/json'}
+        answer = self.service.ask('POST', '/v1/assessments', b'{"R1": 6,5}', json)
+        self.problem(answer, 400)
+
     def test_a_browser_is_shown_its_faults_in_the_form(self):
         answer = self.service.ask(
             'POST',
