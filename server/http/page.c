@@ -40,17 +40,12 @@ void page_format(struct text_out *out, const char *format, ...)
     page_escape(out, text);
 }
 
-void page_begin(struct text_out *out, const char *title, int refresh_s)
+void page_begin(struct text_out *out, const char *title)
 {
     text_out_init(out);
     page_put(out, "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-                  "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
-    if (refresh_s > 0) {
-        page_put(out, "<meta http-equiv=\"refresh\" content=\"");
-        page_format(out, "%d", refresh_s);
-        page_put(out, "\">\n");
-    }
-    page_put(out, "<title>");
+                  "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+                  "<title>");
     page_escape(out, title);
     page_put(out, "</title>\n<link rel=\"stylesheet\" href=\"/assets/plain.css\">\n</head>\n"
                   "<body>\n<main>\n");
@@ -130,7 +125,7 @@ static void put_value(const struct form *form, const char *key)
 static void put_parameter(const struct form *form, const struct ischia_param_info *info)
 {
     char label[128];
-    (void)snprintf(label, sizeof label, "%s (%s, %g to %g)", info->key, info->unit,
+    (void)snprintf(label, sizeof label, "%s %s (%s, %g to %g)", info->name, info->key, info->unit,
                    info->accepted_min, info->accepted_max);
     put_label(form, info->key, label);
     page_put(form->out, "\" inputmode=\"decimal\" required autocomplete=\"off\" title=\"");
@@ -183,7 +178,7 @@ void page_form(struct call *call, const char *body, size_t size, const struct do
     struct text_out out;
     char *sent = body == NULL ? NULL : strndup(body, size);
     const struct form form = {&out, sent, faults};
-    page_begin(&out, "Ischia: assess one side", 0);
+    page_begin(&out, "Ischia: assess one side");
     put_form(&form);
     page_end(&out);
     free(sent);

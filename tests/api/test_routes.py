@@ -328,7 +328,9 @@ class Routes(unittest.TestCase):
         self.service.until(document['id'], 'running')
         self.problem(self.service.get(path + '/field.vtu'), 409)
         self.problem(self.service.ask('DELETE', path), 409)
-        self.assertIn('http-equiv="refresh"', self.service.get(path + '/report').body.decode())
+        page = self.service.get(path + '/report').body.decode()
+        self.assertIn('name="wait" value="60"', page)
+        self.assertNotIn('http-equiv', page)  # a page never reloads by itself
         self.assertEqual(self.service.ask('POST', path + '/cancel').json()['status'], 'cancelled')
         self.assertEqual(self.service.ask('POST', path + '/cancel').status, 200)
         self.assertEqual(self.service.submit(F=213.5)['status'], 'succeeded')
@@ -463,9 +465,10 @@ class Routes(unittest.TestCase):
         self.assertIn(b'<VTKFile', vtu.body)
 
     def test_the_report_is_a_page_that_escapes(self):
-        path = self.service.submit(F=331.5, label='<script>x</script>', subject='R-1')['links'][
-            'self'
-        ]
+        document = self.service.submit(
+            F=331.5, label='<script>x</script>', subject='R-1', side='left'
+        )
+        path = document['links']['self']
         answer = self.service.get(path + '/report')
         page = answer.body.decode()
         self.assertEqual(answer.type, 'text/html')
@@ -477,9 +480,41 @@ class Routes(unittest.TestCase):
             'engineering',
             'section.svg',
             'animal',
-            '331.5 N',
+            'never compare',
+            'Tissue strain report \u00b7 left side',
+            'First at (F = 331.5 N)',
+            'Largest, under the bone',
+            'Name, date, signature',
+            'model macron2020-local 1',
+            document['id'],
+            document['created_at'],
         ):
             self.assertIn(text, page)
+        parameters = self.service.get('/v1/parameters').json()['parameters']
+        for parameter in parameters:  # name, key, value, unit
+            value = document['parameters'][parameter['key']]
+            row = f'{parameter["name"]}</th><td>{parameter["key"]}</td><td class="n">{value:g}</td>'
+            self.assertIn(f'{row}<td>{parameter["unit"]}</td>', page)
+
+    def test_the_report_can_wait_for_the_end(self):
+        document = self.service.submit(wait=0, F=596, eM=44.5)
+        path = document['links']['self'] + '/report'
+        waiting = self.service.get(path).body.decode()
+        self.assertIn('Wait for the result', waiting)
+        self.assertNotIn('Name, date, signature', waiting)
+        self.assertIn('Name, date, signature', self.service.get(path + '?wait=60').body.decode())
+        hanging = self.service.submit(wait=0, F=599, eM=45.5)['links']['self']
+        self.service.until(hanging.rsplit('/', 1)[1], 'running')
+        before = time.monotonic()
+        self.assertIn('Being solved.', self.service.get(hanging + '/report?wait=1').body.decode())
+        self.assertGreater(time.monotonic() - before, 0.9)
+        form = {'Content-Type': 'application/x-www-form-urlencoded'}
+        answer = self.service.ask('POST', hanging + '/cancel', b'', form)
+        self.assertEqual((answer.status, answer.headers['Location']), (303, hanging + '/report'))
+        again = self.service.ask('POST', path.removesuffix('/report') + '/cancel', b'', form)
+        self.assertEqual(again.status, 303)  # too late: the report says how it ended
+        for bad in ('61', '-1', 'x', '', '1&wait=2'):
+            self.problem(self.service.get(f'{path}?wait={bad}'), 400)
 
     def test_pages_need_nothing_from_elsewhere(self):
         for path in ('/', '/form', '/docs', '/assessments'):
