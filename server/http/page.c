@@ -68,6 +68,13 @@ static void sent_value(const struct form *form, const char *key, char *ret, size
     if (form->sent != NULL) (void)query_find(form->sent, key, ret, size);
 }
 
+static bool has_fault(const struct form *form, const char *key)
+{
+    char pointer[80];
+    (void)snprintf(pointer, sizeof pointer, "/%s", key);
+    return form->faults != NULL && doc_faults_has(form->faults, pointer);
+}
+
 static void put_faults(const struct form *form, const char *key)
 {
     char pointer[80];
@@ -118,7 +125,13 @@ static void put_value(const struct form *form, const char *key)
     sent_value(form, key, value, sizeof value);
     page_put(form->out, "\" value=\"");
     page_escape(form->out, value);
-    page_put(form->out, "\"></p>\n");
+    page_put(form->out, "\"");
+    if (has_fault(form, key)) {
+        page_put(form->out, " aria-invalid=\"true\" aria-describedby=\"");
+        page_escape(form->out, key);
+        page_put(form->out, "-fault\"");
+    }
+    page_put(form->out, "></p>\n");
     put_faults(form, key);
 }
 

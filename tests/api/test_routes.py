@@ -462,6 +462,8 @@ class Routes(unittest.TestCase):
         self.assertEqual((svg.status, svg.type), (200, 'image/svg+xml'))
         self.assertEqual((vtu.status, vtu.type), (200, 'application/vnd.vtk.vtu'))
         self.assertIn(b'<svg', svg.body)
+        self.assertNotIn(b'style', svg.body)  # attributes alone: the policy allows no inline style
+        self.assertNotIn('unsafe', svg.headers['Content-Security-Policy'])
         self.assertIn(b'<VTKFile', vtu.body)
 
     def test_the_report_is_a_page_that_escapes(self):
@@ -515,6 +517,13 @@ class Routes(unittest.TestCase):
         self.assertEqual(again.status, 303)  # too late: the report says how it ended
         for bad in ('61', '-1', 'x', '', '1&wait=2'):
             self.problem(self.service.get(f'{path}?wait={bad}'), 400)
+
+    def test_a_page_keeps_its_policy_when_it_has_not_changed(self):
+        page = self.service.get('/')
+        again = self.service.get('/', If_None_Match=page.headers['ETag'])
+        self.assertEqual(again.status, 304)
+        self.assertNotIn('Content-Security-Policy', again.headers)  # a browser would take it over
+        self.assertEqual(again.headers['X-Content-Type-Options'], 'nosniff')
 
     def test_pages_need_nothing_from_elsewhere(self):
         for path in ('/', '/form', '/docs', '/assessments'):

@@ -38,13 +38,14 @@ async function all_of(page, size, result) {
   await page.getByRole('button', { name: 'Fill in' }).click();
   await shoot(page, 'form', size);
   await page.fill('#left-R1', '71');
-  await page.fill('#left-eM', '1,234.5');
+  await page.fill('#right-eF', '1,234.5');
   await page.fill('#right-muM', '12,5');
   await page.click('button[type=submit]');
   await shoot(page, 'form-faults', size);
   await page.goto(result);
   await page.locator('.glance').first().waitFor();
   await page.waitForLoadState('networkidle');
+  await page.evaluate(() => Promise.all([...document.images].map((image) => image.decode())));
   await shoot(page, 'result', size);
   await shoot(page, 'result-whole', size, { fullPage: true });
   await page.getByRole('button', { name: '3-D' }).first().click();

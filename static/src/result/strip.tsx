@@ -41,15 +41,28 @@ const width = 460;
 const margin = 14;
 const line_y = 40;
 
+/* From zero, unless everything is far from it: then what differs would be a blot. */
+function axis_of(values: number[]): { from: number; to: number; marks: number[] } {
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const margin_of_range = 0.04 * (high - low || high);
+  const to = high + margin_of_range || 1;
+  const from = low > 0.4 * high ? low - margin_of_range : 0;
+  return { from, to, marks: ticks(to, (5 * to) / (to - from)).filter((v) => v >= from) };
+}
+
 function Strip(props: { metric: Metric; reference: number[]; ours: number[]; letters: string[] }) {
   const { metric, reference, ours, letters } = props;
-  const max = Math.max(...reference, ...ours) * 1.04 || 1;
-  const x = (v: number): number => margin + (v / max) * (width - 2 * margin);
+  const { from, to, marks } = axis_of([...reference, ...ours]);
+  const x = (v: number): number => margin + ((v - from) / (to - from)) * (width - 2 * margin);
+  const highest = ours.indexOf(
+    Math.max(...ours),
+  ); /* its letter goes to the right, so that two close
+                                                      marks do not write over each other */
   const label = t('strip.alt', { metric: t(metric.key), n: reference.length });
   return (
     <svg class="strip" viewBox={`0 0 ${width} 66`} role="img" aria-label={label}>
       <path class="axis" d={`M${margin} ${line_y}H${width - margin}`} />
-      {ticks(max, 5).map((v) => (
+      {marks.map((v) => (
         <g key={v}>
           <path class="axis" d={`M${x(v)} ${line_y + 8}v4`} />
           <text class="tick" x={x(v)} y={line_y + 24} text-anchor="middle">
@@ -63,7 +76,12 @@ function Strip(props: { metric: Metric; reference: number[]; ours: number[]; let
       {ours.map((v, i) => (
         <g key={i} class={`ours n${i}`}>
           <path d={`M${x(v)} ${line_y - 6}l-6 -10h12z`} />
-          <text x={x(v)} y={line_y - 20} text-anchor={i ? 'start' : 'end'} dx={i ? 1 : -1}>
+          <text
+            x={x(v)}
+            y={line_y - 20}
+            text-anchor={i === highest ? 'start' : 'end'}
+            dx={i === highest ? 1 : -1}
+          >
             {letters[i]}
           </text>
         </g>
@@ -97,7 +115,7 @@ function Row(props: { metric: Metric; sides: ReferenceSide[]; documents: Finishe
       <table class="numbers small">
         <thead>
           <tr>
-            <td />
+            <th scope="col">{t('list.side')}</th>
             <th scope="col">{t(metric.key)}</th>
             <th scope="col">{t('strip.rank')}</th>
           </tr>
