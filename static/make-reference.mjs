@@ -2,7 +2,8 @@
 //
 // Computes the 26 sides of Table 2 with `ischia cohort` and writes what the strip plot needs to
 // reference/table2.json:  node make-reference.mjs ISCHIA [OUT]
-// Run it when the model's version changes; a side that does not converge is left out.
+// Run it when the solver's numbers or the model's version change; a side that does not converge is
+// left out.
 import { execFileSync } from 'node:child_process';
 import { mkdir, mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { availableParallelism, tmpdir } from 'node:os';

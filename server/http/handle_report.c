@@ -79,9 +79,9 @@ static void put_inputs(struct text_out *out, const struct ischia_request *reques
 static void put_strains(struct text_out *out, const struct ischia_result *r)
 {
     char above[32], depth[48];
-    (void)snprintf(depth, sizeof depth, "%.1f mm below the bone", r->strain.eps_max_depth_mm);
+    (void)snprintf(depth, sizeof depth, "axis, %.1f mm below the bone", r->strain.eps_max_depth_mm);
     begin_table(out, "Strain in the muscle");
-    begin_row(out, "eps_max: shear on the axis");
+    begin_row(out, "eps_max");
     put_cell(out, "<td>", "engineering");
     put_number(out, "%.3f \u00b1 %.3f", r->strain.eps_max, r->numerics.eps_max_error);
     put_cell(out, "<td>", depth);
@@ -90,12 +90,11 @@ static void put_strains(struct text_out *out, const struct ischia_result *r)
         const char *name, *measure;
         double value, threshold;
     } rows[] = {
-        {"E_shear: largest", "Green\u2013Lagrange", r->strain.E_shear_max,
-         ISCHIA_E_SHEAR_THRESHOLD},
-        {"E_comp: largest", "Green\u2013Lagrange", r->strain.E_comp_max, ISCHIA_E_COMP_THRESHOLD},
+        {"E_shear", "Green\u2013Lagrange", r->strain.E_shear_max, ISCHIA_E_SHEAR_THRESHOLD},
+        {"E_comp", "Green\u2013Lagrange", r->strain.E_comp_max, ISCHIA_E_COMP_THRESHOLD},
     };
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        (void)snprintf(above, sizeof above, "threshold %.2f", rows[i].threshold);
+        (void)snprintf(above, sizeof above, "largest; threshold %.2f", rows[i].threshold);
         begin_row(out, rows[i].name);
         put_cell(out, "<td>", rows[i].measure);
         put_number(out, "%.3f", rows[i].value);

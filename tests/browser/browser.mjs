@@ -107,6 +107,28 @@ export async function on_paper(page) {
   }
 }
 
+/* What sticks out of a report where paper cuts it off; empty when all of it is printed. */
+export async function cut_off(page) {
+  const paper = { width: 688, height: 1010 }; /* A4 less its margins, in CSS pixels */
+  const before = page.viewportSize();
+  await page.setViewportSize(paper);
+  await page.emulateMedia({ media: 'print' });
+  const found = await page.evaluate(() =>
+    [...document.querySelectorAll('.report')].flatMap((report) => {
+      const edge = report.getBoundingClientRect();
+      return [...report.querySelectorAll('td, th, p, li, h1, h2, h3, img, caption')]
+        .filter((e) => {
+          const box = e.getBoundingClientRect();
+          return box.right > edge.right + 1 || box.bottom > edge.bottom + 1;
+        })
+        .map((e) => e.textContent || e.tagName);
+    }),
+  );
+  await page.emulateMedia({ media: null });
+  await page.setViewportSize(before);
+  return found;
+}
+
 /* A stand-in daemon and a browser for one test file; `finish` ends both. */
 export async function stage(options) {
   const daemon = new StandIn(dist);

@@ -10,6 +10,7 @@ import { fileURLToPath } from 'node:url';
 import {
   assert_accessible,
   assert_clean,
+  cut_off,
   launch,
   on_paper,
   open_form,
@@ -227,6 +228,7 @@ test('the report of the daemon is one A4 page and has all that a report must', a
   await page.goto(`${origin}/v1/assessments/${id}/report`);
   await page.locator('figure img').evaluate((image) => image.decode());
   await assert_accessible(page, 'the report of the daemon');
+  assert.deepEqual(await cut_off(page), []);
   const { pages, is_a4, text } = await on_paper(page);
   assert.deepEqual([pages, is_a4], [1, true]);
   for (const part of [
@@ -258,6 +260,7 @@ test('the report of the daemon is one A4 page and has all that a report must', a
   assert.equal(long.status, 'succeeded');
   await page.goto(`${origin}/v1/assessments/${long.id}/report`);
   assert.equal(await page.locator('li.warning').count(), 7);
+  assert.deepEqual(await cut_off(page), []);
   const paper = await on_paper(page);
   assert.equal(paper.pages, 1);
   assert.match(paper.text[0], /Name, date, signature/);

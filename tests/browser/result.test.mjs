@@ -6,6 +6,7 @@ import { after, afterEach, before, beforeEach, test } from 'node:test';
 import {
   assert_accessible,
   assert_clean,
+  cut_off,
   fill_side,
   moving,
   on_paper,
@@ -245,6 +246,18 @@ test('the report prints on one A4 page a side and says what it must', async () =
     assert.match(text[0], part);
   assert.doesNotMatch(text.join(), /Change and compute again/);
   assert.ok(bytes > 5000);
+  const address = page.url();
+  for (const d of [...s.daemon.documents.values()].slice(-2)) {
+    d.subject = 'x'.repeat(64);
+    d.label = 'y'.repeat(200);
+  }
+  await page.goto(address);
+  await all_ended(2);
+  for (const language of ['en', 'fr', 'de']) {
+    await page.selectOption('.language select', language);
+    assert.deepEqual(await cut_off(page), [], language);
+    assert.equal((await on_paper(page)).pages, 2, language);
+  }
 });
 
 test('the list can be saved for a spreadsheet', async () => {

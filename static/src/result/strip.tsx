@@ -6,7 +6,7 @@ import { format, format_fixed, t, type Key } from '../i18n.js';
 import { comparable_sides, type ReferenceSide } from '../reference.js';
 import type { Result } from '../types.js';
 import { column_letters, column_names, side_letter } from '../ui.js';
-import { ticks } from './axis.js';
+import { axis_of } from './axis.js';
 import type { Finished } from './quantities.js';
 
 interface Metric {
@@ -41,18 +41,9 @@ const width = 460;
 const margin = 14;
 const line_y = 40;
 
-/* From zero, unless everything is far from it: then what differs would be a blot. */
-function axis_of(values: number[]): { from: number; to: number; marks: number[] } {
-  const [low, high] = [Math.min(...values), Math.max(...values)];
-  const margin_of_range = 0.04 * (high - low || high);
-  const to = high + margin_of_range || 1;
-  const from = low > 0.4 * high ? low - margin_of_range : 0;
-  return { from, to, marks: ticks(to, (5 * to) / (to - from)).filter((v) => v >= from) };
-}
-
 function Strip(props: { metric: Metric; reference: number[]; ours: number[]; letters: string[] }) {
   const { metric, reference, ours, letters } = props;
-  const { from, to, marks } = axis_of([...reference, ...ours]);
+  const { from, to, marks } = axis_of([...reference, ...ours], 5);
   const x = (v: number): number => margin + ((v - from) / (to - from)) * (width - 2 * margin);
   const highest = ours.indexOf(
     Math.max(...ours),
@@ -60,7 +51,7 @@ function Strip(props: { metric: Metric; reference: number[]; ours: number[]; let
                                                       marks do not write over each other */
   const label = t('strip.alt', { metric: t(metric.key), n: reference.length });
   return (
-    <svg class="strip" viewBox={`0 0 ${width} 66`} role="img" aria-label={label}>
+    <svg class="strip" viewBox={`0 0 ${width} 72`} role="img" aria-label={label}>
       <path class="axis" d={`M${margin} ${line_y}H${width - margin}`} />
       {marks.map((v) => (
         <g key={v}>
