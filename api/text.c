@@ -160,7 +160,7 @@ static size_t skip_digits_and_marks(const char *bytes, size_t length, int *ret_m
     return at;
 }
 
-/* A sign, digits with marks among them, an exponent: what strtod() reads when the mark is a point. */
+/* A sign, digits with marks among them, an exponent: what strtod() reads once the mark is '.'. */
 static enum text_typed typed_kind(const char *bytes, size_t length)
 {
     int marks;

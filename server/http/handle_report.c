@@ -16,8 +16,8 @@
 
 /*
  * GET …/report: one side on one A4 page, for printing and for pages without JavaScript. Before the
- * end it says so, with a button that asks again and waits ("?wait=N"): a page that reloads by itself
- * would take the place from under a screen reader.
+ * end it says so, with a button that asks again and waits ("?wait=N"): a page that reloads by
+ * itself would take the place from under a screen reader.
  */
 
 enum { WAIT_MAX_S = 60 };
