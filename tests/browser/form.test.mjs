@@ -44,6 +44,7 @@ test('label, unit, range and help of every field come from the daemon', async ()
     assert.ok(range.includes(`${accepted.min} to ${accepted.max} ${unit}`), range);
     assert.ok(range.includes(`studied ${studied.min} to ${studied.max}`), range);
   }
+  await assert_accessible(page, 'the empty form');
 });
 
 test('decimal comma and decimal point mean the same, and the value is echoed', async () => {
@@ -89,6 +90,7 @@ test('outside the studied range is a note, not a fault', async () => {
   await page.fill('#left-muM', '12');
   await leave();
   assert.match(await text_of('left', 'muM'), /Outside the studied range/);
+  await assert_accessible(page, 'the form with a warning');
   assert.equal(await page.getAttribute('#left-muM', 'aria-invalid'), 'false');
 });
 
@@ -107,6 +109,7 @@ test('total thickness gives eM, and says how', async () => {
   await page.getByLabel(/total thickness of muscle and fat instead of eM, Left/).check();
   await page.fill('#left-eM', '41,2');
   assert.equal(await text_of('left', 'eM'), 'eM = 41,2 − 10 = 31.2 mm');
+  await assert_accessible(page, 'the form with a total thickness');
   await page.fill('#left-eM', '80');
   assert.match(await text_of('left', 'eM'), /Above 60 mm/);
   await page.fill('#left-eM', '41.2');
