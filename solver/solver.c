@@ -310,8 +310,8 @@ static void judge(struct solve *s)
     if (!(n->det_F_min > 0) || !is_sound(&level->report)) {
         n->reason = ISCHIA_DIVERGED_CHECKS;
         (void)snprintf(n->detail, sizeof n->detail,
-                       "the load path ended, but det F is %.3g at the least (> 0 wanted) and the "
-                       "energy balance is off by %.2g (at most %g)",
+                       "det F is %.3g at the least (> 0 wanted), the energy balance is off by %.2g "
+                       "(at most %g)",
                        n->det_F_min, n->energy_residual, energy_residual_max);
     }
 }

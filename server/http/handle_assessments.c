@@ -137,13 +137,6 @@ static bool peek(struct call *call, struct store_assessment *ret_row, struct htt
     return false;
 }
 
-/* True while there is a reason to wait for the end of the assessment. */
-static bool still_waiting(struct call *call, const struct store_assessment *row)
-{
-    return !queue_is_final(row->state) && http_now_ms() < call->deadline_ms &&
-           !http_is_stopping(call->service->http) && call->subscription != NULL;
-}
-
 void handle_get(struct call *call, struct http_response *ret)
 {
     struct store_assessment row;
@@ -153,7 +146,7 @@ void handle_get(struct call *call, struct http_response *ret)
         if (call->deadline_ms > 0) (void)call_subscribe(call);
     }
     if (!peek(call, &row, ret)) return;
-    if (still_waiting(call, &row))
+    if (call_still_waits(call, queue_is_final(row.state)))
         call_wait(call, ret);
     else
         send_row(call, &row, 200, ret);
@@ -359,7 +352,7 @@ static void finish_submit(struct call *call, struct http_response *ret)
         if (call->deadline_ms > 0) (void)call_subscribe(call);
     }
     if (!peek(call, &row, ret)) return;
-    if (still_waiting(call, &row))
+    if (call_still_waits(call, queue_is_final(row.state)))
         call_wait(call, ret);
     else
         send_accepted(call, &row, ret);
@@ -391,13 +384,13 @@ void handle_cancel(struct call *call, struct http_response *ret)
         reply_failure(call->request, ret, &err);
     else if (answer == STORE_NOT_FOUND)
         reply_no_assessment(call, ret);
-    else if (answer == STORE_CONFLICT && was != QUEUE_CANCELLED)
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This assessment has ended: %s.",
-                      queue_state_names[was]);
-    else if (is_form(call)) { /* the plain report's button */
+    else if (is_form(call)) { /* the plain report's button: the report says how it ended */
         ret->status = 303;
         http_header(ret, "Location", "/v1/assessments/%s/report", call->id_text);
-    } else
+    } else if (answer == STORE_CONFLICT && was != QUEUE_CANCELLED)
+        reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This assessment has ended: %s.",
+                      queue_state_names[was]);
+    else
         read_and_render(call, 0, ret); /* cancelling twice is no fault */
 }
 
