@@ -550,7 +550,7 @@ static struct pool_options with_defaults(const struct pool_options *given)
     options.render_workers = default_to(given->render_workers, 1);
     options.solve_deadline_ms = default_to(given->solve_deadline_ms, 15 * 60 * 1000);
     options.render_deadline_ms = default_to(given->render_deadline_ms, 60 * 1000);
-    options.hello_deadline_ms = default_to(given->hello_deadline_ms, 10 * 1000);
+    options.hello_deadline_ms = default_to(given->hello_deadline_ms, 30 * 1000);
     options.backoff_min_ms = default_to(given->backoff_min_ms, 100);
     options.backoff_max_ms = default_to(given->backoff_max_ms, 10 * 1000);
     options.render_idle_ms = default_to(given->render_idle_ms, 60 * 1000);

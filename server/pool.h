@@ -30,7 +30,7 @@ struct pool_options {
     size_t memory_max_bytes;    /* RLIMIT_DATA of each worker; 0: no limit                    */
     int solve_deadline_ms;      /* from the job's sending to its outcome; 0: 15 minutes       */
     int render_deadline_ms;     /* 0: 60 s                                                    */
-    int hello_deadline_ms;      /* from start to hello; 0: 10 s                               */
+    int hello_deadline_ms;      /* from start to hello; 0: 30 s                               */
     int backoff_min_ms;         /* pause after a worker's death, doubled while they keep dying */
     int backoff_max_ms;         /* 0, 0: 100 ms, 10 s                                         */
     int render_idle_ms;         /* an idle render worker leaves after this; 0: 60 s           */

@@ -4,7 +4,8 @@
 the service need no mechanics and can ask for what a solver seldom does.
 
 The force says what happens: 599 N never ends, 598 N ends in a problem, 597 N kills the worker,
-596 N takes a second; any other gives a result, always the same but for what echoes the inputs.
+596 N takes a second, 595 N until the file /tmp/ischia-gate-PID is there, PID being the daemon's; any
+other gives a result, always the same but for what echoes the inputs.
 """
 import json
 import os
@@ -12,7 +13,7 @@ import socket
 import sys
 import time
 
-HANG, PROBLEM, DIE, SLOW = 599, 598, 597, 596
+HANG, PROBLEM, DIE, SLOW, GATE = 599, 598, 597, 596, 595
 
 
 class Frames:
@@ -114,6 +115,8 @@ def solve(frames, message):
         time.sleep(3600)
     if force == DIE:
         os._exit(3)
+    while force == GATE and not os.path.exists(f'/tmp/ischia-gate-{os.getppid()}'):
+        time.sleep(0.02)
     steps = 5
     for i in range(steps):
         time.sleep((1.0 if force == SLOW else 0.01) / steps)

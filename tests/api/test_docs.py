@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 import unittest
 
-from service import HERE, PROGRAM, Service
+from service import HERE, PATIENCE_S, PROGRAM, Service
 
 ROOT = os.path.join(HERE, '../..')
 
@@ -56,7 +56,7 @@ class Docs(unittest.TestCase):
                     ['bash', '-c', line],
                     env=environment,
                     cwd=folder,
-                    timeout=60,
+                    timeout=PATIENCE_S,
                     capture_output=True,
                     text=True,
                 )

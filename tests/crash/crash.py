@@ -11,6 +11,7 @@ import time
 import uuid
 
 STATES = ("queued", "running", "succeeded", "failed", "cancelled")
+PATIENCE_S = 600  # no expectation of speed: only something that hangs takes so long
 CANCEL_EVERY = 11  # as in harness.c
 FINAL_KINDS = {3: "succeeded", 4: "failed", 5: "cancelled"}
 
@@ -142,8 +143,17 @@ def kill_one_worker(harness):
             pass
 
 
-def wait_for(condition, seconds, what):
-    until = time.monotonic() + seconds
+def count(harness, word):
+    return sum(line.startswith(word + " ") for line in list(harness.lines))
+
+
+def wait_while_alive(harness, condition, what):
+    """Waits for the condition; when the harness ends before, says what it said last."""
+    until = time.monotonic() + PATIENCE_S
     while not condition():
-        assert time.monotonic() < until, "waited %d s for %s" % (seconds, what)
-        time.sleep(0.02)
+        if harness.process.poll() is not None:
+            harness.wait()
+            raise AssertionError("waiting for %s: it ended with %d: %s; its last lines: %s" % (
+                what, harness.process.returncode, harness.error.strip(), harness.lines[-5:]))
+        assert time.monotonic() < until, "waited %d s for %s" % (PATIENCE_S, what)
+        time.sleep(0.01)

@@ -13,11 +13,10 @@ import sys
 import tempfile
 import time
 
-from crash import Harness, Promises, judge, wait_for
+from crash import PATIENCE_S, Harness, Promises, count, judge, wait_while_alive
 
 SKIPPED = 77
 SIZE = "size=64m"
-PATIENCE_S = 600  # not an expectation: only something that hangs takes so long
 STARTS_ON_A_FULL_DISK = 8
 REFUSAL = "database or disk is full (free some disk space)"
 
@@ -70,23 +69,8 @@ def remount(top, options):
     subprocess.run(["mount", "-o", "remount," + options, top], check=True)
 
 
-def count(harness, word):
-    return sum(line.startswith(word + " ") for line in list(harness.lines))
-
-
 def serve(arguments, top):
     return Harness("serve", arguments[0], top + "/state", arguments[1])
-
-
-def wait_while_alive(harness, condition, what):
-    """Says what the harness said last when it ended instead."""
-    def holds():
-        if harness.process.poll() is not None:
-            harness.wait()
-            raise AssertionError("waiting for %s: it ended with %d: %s; its last lines: %s" % (
-                what, harness.process.returncode, harness.error.strip(), harness.lines[-5:]))
-        return condition()
-    wait_for(holds, PATIENCE_S, what)
 
 
 def refuse_when_full(harness, ballast):
