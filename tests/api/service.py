@@ -58,26 +58,25 @@ def admin(state, *words, check=True):
     return done.stdout if check else done
 
 
+def command_line(state, *options, listen='127.0.0.1:0', worker=FAKE_WORKER):
+    """How a test starts the daemon; a later option wins."""
+    usual = {
+        '--listen': listen,
+        '--state-dir': state,
+        '--worker-program': worker,
+        '--workers': '1',
+        '--drain-timeout': '2',
+    }
+    return [PROGRAM, *(word for pair in usual.items() for word in pair), *options]
+
+
 class Service:
     def __init__(self, *options, state=None, worker=FAKE_WORKER, listen='127.0.0.1:0', env=None):
         self.own_state = state is None
         self.state = state or tempfile.mkdtemp(prefix='ischia-test-')
         self.log = open(os.path.join(self.state, 'stderr.txt'), 'ab')
         self.process = subprocess.Popen(
-            [
-                PROGRAM,
-                '--listen',
-                listen,
-                '--state-dir',
-                self.state,
-                '--worker-program',
-                worker,
-                '--workers',
-                '1',
-                '--drain-timeout',
-                '2',
-                *options,
-            ],
+            command_line(self.state, *options, listen=listen, worker=worker),
             stdout=subprocess.PIPE,
             stderr=self.log,
             text=True,
@@ -138,6 +137,13 @@ class Service:
         while self.ask('GET', '/readyz', headers=headers).status != 200:
             assert time.monotonic() < end, 'never ready'
             time.sleep(0.05)
+
+    def kill(self):
+        """kill -9; what it has stored stays."""
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+        self.log.close()
 
     def signal(self, number):
         self.process.send_signal(number)

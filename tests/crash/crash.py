@@ -34,17 +34,6 @@ class Harness:
                 self.ready.set()
         self.ready.set()
 
-    def workers(self):
-        """Its children, whichever thread started them."""
-        tasks, found = "/proc/%d/task" % self.process.pid, []
-        for task in os.listdir(tasks):
-            try:
-                with open("%s/%s/children" % (tasks, task)) as children:
-                    found += [int(pid) for pid in children.read().split()]
-            except OSError:
-                pass  # a thread that has just ended
-        return found
-
     def kill(self):
         self.process.kill()
         return self.wait()
@@ -134,8 +123,20 @@ def judge_one(name, n, deed, row, ends, cancelled):
     return faults
 
 
-def kill_one_worker(harness):
-    workers = harness.workers()
+def workers_of(pid):
+    """Its children, whichever thread started them."""
+    found = []
+    try:
+        for task in os.listdir("/proc/%d/task" % pid):
+            with open("/proc/%d/task/%s/children" % (pid, task)) as children:
+                found += [int(child) for child in children.read().split()]
+    except OSError:
+        pass  # a thread that has just ended
+    return found
+
+
+def kill_one_worker(pid):
+    workers = workers_of(pid)
     if workers:
         try:
             os.kill(random.choice(workers), signal.SIGKILL)

@@ -22,7 +22,7 @@ def one_life(program, directory, worker, promises):
         wait_while_alive(harness, lambda: count(harness, "accepted") >= goal, "accepted requests")
         time.sleep(random.uniform(0, 0.1))
         if random.random() < 0.5:
-            kill_one_worker(harness)
+            kill_one_worker(harness.process.pid)
             time.sleep(random.uniform(0, 0.03))
     else:
         time.sleep(random.uniform(0, 0.02))  # while it opens and recovers
