@@ -348,14 +348,42 @@ static int http_thread_count(const struct config *config)
     return cores < 1 ? 1 : cores > MOST ? MOST : (int)cores;
 }
 
+/* Connections stop where descriptors would end, with some left for store and workers: a listening
+ * socket whose connections cannot be taken keeps a thread busy for nothing. */
+static enum ischia_code count_connections(const struct config *config, int *ret,
+                                          struct ischia_error *err)
+{
+    enum { RESERVE = 48, PER_WORKER = 4, PER_THREAD = 4, FEWEST = 16 };
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    const int workers = config->workers > 0 ? config->workers : cores < 1 ? 1 : (int)cores;
+    const int reserve = RESERVE + PER_WORKER * workers + PER_THREAD * http_thread_count(config);
+    struct rlimit limit;
+    *ret = config->connections;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY ||
+        limit.rlim_cur >= (rlim_t)config->connections + (rlim_t)reserve)
+        return ISCHIA_OK;
+    CHECK(limit.rlim_cur >= (rlim_t)(reserve + FEWEST), err, ISCHIA_E_LIMIT,
+          "only %llu open files are allowed; with %d workers at least %d are needed: raise the "
+          "limit (ulimit -n, LimitNOFILE=)",
+          (unsigned long long)limit.rlim_cur, workers, reserve + FEWEST);
+    *ret = (int)limit.rlim_cur - reserve;
+    LOG_WARNING("fewer connections than configured", "connections=%d open_files=%llu", *ret,
+                (unsigned long long)limit.rlim_cur);
+    return ISCHIA_OK;
+}
+
+static int smaller(int a, int b) { return a < b ? a : b; }
+
 static enum ischia_code start_http(struct daemon *d, struct ischia_error *err)
 {
     const struct config *config = &d->service.config;
+    int connections;
+    TRY(count_connections(config, &connections, err));
     const struct http_options options = {
         .listen = config->listen,
         .threads = http_thread_count(config),
-        .connections = config->connections,
-        .connections_per_address = config->connections_per_address,
+        .connections = connections,
+        .connections_per_address = smaller(config->connections_per_address, connections),
         .idle_timeout_s = config->idle_timeout_s,
         .request_timeout_s = config->request_timeout_s,
         .tls = uses_tls(config),

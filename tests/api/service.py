@@ -71,12 +71,13 @@ def command_line(state, *options, listen='127.0.0.1:0', worker=FAKE_WORKER):
 
 
 class Service:
-    def __init__(self, *options, state=None, worker=FAKE_WORKER, listen='127.0.0.1:0', env=None):
+    def __init__(self, *options, state=None, worker=FAKE_WORKER, listen='127.0.0.1:0', env=None,
+                 within=()):
         self.own_state = state is None
         self.state = state or tempfile.mkdtemp(prefix='ischia-test-')
         self.log = open(os.path.join(self.state, 'stderr.txt'), 'ab')
         self.process = subprocess.Popen(
-            command_line(self.state, *options, listen=listen, worker=worker),
+            [*within, *command_line(self.state, *options, listen=listen, worker=worker)],
             stdout=subprocess.PIPE,
             stderr=self.log,
             text=True,
