@@ -710,11 +710,12 @@ enum ischia_code http_start(struct http_server **ret, const struct http_options 
     enum ischia_code code = start_ticker(server, err);
     if (code == ISCHIA_OK)
         code = listen_open(options->listen, &server->listen_fd, server->address, err);
+    *ret = server; /* the first request may come before start_daemon returns */
     if (code == ISCHIA_OK) code = start_daemon(server, err);
-    if (code == ISCHIA_OK)
-        *ret = server;
-    else
+    if (code != ISCHIA_OK) {
+        *ret = NULL;
         http_destroy(server);
+    }
     return code;
 }
 

@@ -268,7 +268,9 @@ class Retention(unittest.TestCase):
                 changes = service.get('/v1/changes?since=0&limit=500').json()['items']
                 erased = [item['id'] for item in changes if item['change'] == 'erased']
                 self.assertEqual(erased, made[:3])
-                self.assertIn('event="retention" erased=3', service.errors())
+                eventually(
+                    lambda: 'event="retention" erased=3' in service.errors(), 'the log to say so'
+                )
 
     def test_by_age(self):
         with tempfile.TemporaryDirectory() as state:
