@@ -30,8 +30,6 @@
 enum { EXIT_USAGE = 2, TICK_MS = 1000, RETIRE_EVERY_S = 60, RETIRE_BATCH = 200 };
 enum { SWEEP_AGE_MS = 5 * 60 * 1000, TLS_FILE_BYTES = 256 * 1024 };
 
-extern char **environ;
-
 struct daemon {
     struct service service;
     struct arguments *arguments;

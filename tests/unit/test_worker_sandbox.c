@@ -31,7 +31,7 @@ struct means {
     char path[64]; /* of a file that is not there */
 };
 
-/* Does not return, but does not say so: AddressSanitizer tidies up before what does, with calls that
+/* Does not return, but does not say so: AddressSanitizer tidies up before what does, by calls that
  * are no longer allowed. */
 static void leave(int status) { (void)syscall(SYS_exit_group, status); }
 
