@@ -250,11 +250,19 @@ static void act_on_result(struct pool *pool, struct worker *worker, const struct
     end_solve(pool, worker, &outcome);
 }
 
+static void remember_program(struct pool *pool, const char *program)
+{
+    (void)pthread_mutex_lock(&pool->lock);
+    (void)snprintf(pool->stats.program, sizeof pool->stats.program, "%s", program);
+    (void)pthread_mutex_unlock(&pool->lock);
+}
+
 static void act_on(struct pool *pool, struct worker *worker, const struct worker_report *report)
 {
     switch (report->news) {
     case NEWS_READY:
-        note(pool, POOL_NOTE_READY, worker, worker->process.pid, "");
+        remember_program(pool, report->text);
+        note(pool, POOL_NOTE_READY, worker, worker->process.pid, report->text);
         become_idle(worker);
         return;
     case NEWS_PROGRESS:

@@ -170,3 +170,5 @@ enum ischia_code tls_set(const char *certificate_pem, const char *key_pem, time_
 }
 
 void tls_clear(void) { replace(NULL, NULL); }
+
+const char *tls_library_version(void) { return gnutls_check_version(NULL); }

@@ -23,4 +23,6 @@ void tls_clear(void);
 /* A gnutls_certificate_retrieve_function3, as the HTTP library takes it. */
 void *tls_callback(void);
 
+const char *tls_library_version(void); /* "3.7.9" */
+
 #endif

@@ -8,6 +8,7 @@
 
 #include "api/json.h"
 #include "server/http/http.h"
+#include "server/http/tls.h"
 #include "server/store/store.h"
 
 const struct version *versions(void)
@@ -15,6 +16,7 @@ const struct version *versions(void)
     static const struct version rows[] = {
         {"store", store_engine},
         {"libmicrohttpd", http_library_version},
+        {"GnuTLS", tls_library_version},
         {"libsodium", sodium_version_string},
         {"zlib", zlibVersion},
         {"cJSON", json_library_version},

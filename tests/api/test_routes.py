@@ -492,7 +492,9 @@ class Routes(unittest.TestCase):
         self.assertEqual(self.service.get('/readyz').json()['status'], 'ready')
         version = self.service.get('/version').json()
         self.assertEqual(version['model'], {'name': 'macron2020-local', 'version': 1})
-        self.assertTrue(version['libraries']['libmicrohttpd'])
+        for name in ('libmicrohttpd', 'GnuTLS', 'libsodium', 'zlib', 'cJSON', 'store'):
+            self.assertRegex(version['libraries'][name], r'\d+\.\d+')
+        self.assertEqual(version['worker'], 'fake')
         metrics = self.service.get('/metrics').body.decode()
         for line in (
             'ischia_http_requests_total{route="GET /healthz",code="200"}',

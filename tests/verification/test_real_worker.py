@@ -28,6 +28,7 @@ class RealWorker(unittest.TestCase):
             status = status_of(worker)
             self.assertEqual((status['Seccomp'], status['NoNewPrivs']), ('2', '1'))
             self.assertEqual(sorted(os.listdir(f'/proc/{worker}/fd')), ['0', '1', '2', '3'])
+            self.assertRegex(service.get('/version').json()['worker'], r'^[\d.]+, CHOLMOD [\d.]+')
             document = service.submit(wait=0, resolution='fine')
             service.until(document['id'], 'running')
             answer = service.ask('POST', document['links']['self'] + '/cancel')
