@@ -147,6 +147,10 @@ class Tokens(unittest.TestCase):
         log = admin(self.service.state, 'audit', 'list')
         self.assertNotIn('SECRET-9', log)
         self.assertNotIn('SECRET-9', self.service.errors())
+        metrics = self.service.ask('GET', '/metrics', headers=bearer(token)).body.decode()
+        self.assertIn('ischia_http_requests_total', metrics)
+        for trace in ('SECRET-9', document['id']):
+            self.assertNotIn(trace, metrics)
         self.assertIn('the chain holds', admin(self.service.state, 'audit', 'verify'))
 
 
@@ -335,6 +339,19 @@ class Doors(unittest.TestCase):
                 )
             self.assertNotEqual(done.returncode, 0)
             self.assertIn(words, done.stderr)
+
+    def test_good_options_are_said_to_be_good(self):
+        with tempfile.TemporaryDirectory() as folder:
+            state = os.path.join(folder, 'state')
+            done = subprocess.run(
+                [PROGRAM, '--state-dir', state, '--workers', '3', '--check-config'],
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE_S,
+            )
+            self.assertEqual((done.returncode, done.stderr), (0, ''))
+            self.assertIn('good', done.stdout)
+            self.assertFalse(os.path.exists(state), 'checking starts nothing')
 
     def test_later_sources_win(self):
         with tempfile.TemporaryDirectory() as folder:
