@@ -3,9 +3,10 @@
 """kill -9 of ischiad itself at random moments while clients use it over HTTP:
 kill_service.py MOMENTS [SEED], the daemon in $ISCHIAD.
 
-Defends invariants I1 to I4, I6, I11 to I13 and I18 of docs/INVARIANTS.md from where a client stands. Four
-clients submit, wait, cancel, erase and follow the changes; what was answered is a promise. What
-was cut off is asked again with the same Idempotency-Key after the restart, as a client should.
+Defends invariants I1 to I4, I6, I11 to I13 and I18 of docs/INVARIANTS.md from where a client
+stands. Four clients submit, wait, cancel, erase and follow the changes; what was answered is a
+promise. What was cut off is asked again with the same Idempotency-Key after the restart, as a
+client should.
 Before some of the kills a worker is killed as well; some fall while the daemon starts.
 """
 import http.client
