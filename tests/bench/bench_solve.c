@@ -115,10 +115,9 @@ struct row {
 static int split(char *line, char **ret)
 {
     int count = 0;
-    for (char *at = line; count < FIELDS_MAX; at = NULL) {
-        char *field = strtok(at, ",\r\n");
-        if (field == NULL) break;
-        ret[count++] = field;
+    while (count < FIELDS_MAX && line != NULL) {
+        char *field = strsep(&line, ",\r\n");
+        if (field[0] != '\0') ret[count++] = field;
     }
     return count;
 }
