@@ -33,6 +33,13 @@ def resident_mib(service):
         return int(re.search(r'VmRSS:\s+(\d+)', file.read()).group(1)) / 1024
 
 
+def cpu_ms(service):
+    """What all its threads have used."""
+    with open(f'/proc/{service.process.pid}/stat', encoding='ascii') as file:
+        user, system = file.read().rsplit(')', 1)[1].split()[11:13]
+    return (int(user) + int(system)) * 1e3 / os.sysconf('SC_CLK_TCK')
+
+
 class Many(unittest.TestCase):
     def test_an_idle_daemon_is_small(self):
         with Service('--workers', '2') as service:
@@ -95,13 +102,15 @@ class Many(unittest.TestCase):
                 self.assert_quick(service, query)
 
     def assert_quick(self, service, query):
-        times = []
+        """Under 50 ms a page, of the daemon's own processor time: others may hold it up."""
+        times, before = [], cpu_ms(service)
         for _ in range(21):
             begun = time.monotonic()
             self.assertEqual(service.get('/v1/assessments?' + query).status, 200)
             times.append((time.monotonic() - begun) * 1e3)
-        print(f'{query}: median {statistics.median(times):.1f} ms, most {max(times):.1f} ms')
-        self.assertLess(statistics.median(times), 50, query)
+        spent = (cpu_ms(service) - before) / len(times)
+        print(f'{query}: {spent:.1f} ms of processor time, median {statistics.median(times):.1f} ms')
+        self.assertLess(spent, 50, query)
 
 
 if __name__ == '__main__':
