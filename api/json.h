@@ -36,6 +36,7 @@ struct json_limits {
 };
 extern const struct json_limits
     json_limits_request;                            /* 64 KiB, 16, 256: what a client may send    */
+extern const struct json_limits json_limits_record; /* 256 KiB, 32, 256: what record systems send */
 extern const struct json_limits json_limits_stored; /* 16 MiB, 16, 256: what we wrote ourselves   */
 
 /*
@@ -52,6 +53,13 @@ ISCHIA_MUST_CHECK enum ischia_code json_parse(struct json **ret, const char *tex
                                               const struct json_limits *limits,
                                               struct doc_faults *faults, struct ischia_error *err);
 void json_destroy(struct json *root); /* NULL allowed */
+
+/* Notes the digits of every number as they stand in the text that root was parsed from, so that
+ * json_digits can give them back: 7.10 stays "7.10". ISCHIA_E_MEMORY. */
+ISCHIA_MUST_CHECK enum ischia_code json_keep_digits(struct json *root, const char *text,
+                                                    size_t length, struct ischia_error *err);
+/* Of a JSON_NUMBER after json_keep_digits; else NULL. */
+const char *json_digits(const struct json *value);
 
 /* Looking at a value; strings live as long as the document. */
 enum json_type json_type_of(const struct json *value);

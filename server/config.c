@@ -64,6 +64,9 @@ const struct config_option config_options[] = {
     TEXT(allowed_origins, "",
          "Origins, separated by commas, whose pages may change something; this server's own "
          "always may."),
+    TEXT(public_url, "",
+         "Address under which others reach this service, as https://host: in links of FHIR "
+         "resources, cards, messages and webhooks; empty: that of the request."),
     NUMBER("http_threads", http_threads, "threads", 0, 256, "0", false,
            "Threads that answer requests; 0: one a processor core, at most 8."),
     NUMBER("connections", connections, "connections", 16, 1000000, "4096", false,

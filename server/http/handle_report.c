@@ -11,6 +11,7 @@
 #include "api/risk.h"
 #include "server/http/page.h"
 #include "server/http/reply.h"
+#include "server/http/report.h"
 #include "server/http/routes.h"
 
 /*
@@ -162,14 +163,25 @@ static void put_notes(struct text_out *out, const struct ischia_case *c)
     page_put(out, "</footer>\n");
 }
 
+static void put_figure(struct text_out *out, const struct store_assessment *row)
+{
+    char id[UUID_TEXT_BYTES];
+    uuid_format(&row->id, id);
+    page_put(out, "<figure><img alt=\"Section through the loaded tissue, coloured by "
+                  "shear strain, with the threshold's contour\" src=\"/v1/assessments/");
+    page_put(out, id);
+    page_put(out,
+             "/section.svg\"><figcaption>Symmetry section under load, Green\u2013Lagrange shear "
+             "strain.</figcaption></figure>\n");
+}
+
 static enum ischia_code put_result(struct text_out *out, const struct store_assessment *row,
-                                   const struct ischia_request *request, struct ischia_error *err)
+                                   const struct ischia_request *request, bool attached,
+                                   struct ischia_error *err)
 {
     struct ischia_result r;
-    char id[UUID_TEXT_BYTES];
     TRY(result_doc_read(&r, NULL, row->result_json, strlen(row->result_json), &json_limits_stored,
                         err));
-    uuid_format(&row->id, id);
     put_words(out, &request->values, &r);
     page_put(out, "<div class=\"columns\">\n<div>\n");
     put_identity(out, row, request);
@@ -178,13 +190,8 @@ static enum ischia_code put_result(struct text_out *out, const struct store_asse
     page_put(out, "</div>\n<div>\n");
     put_strains(out, &r);
     put_clusters(out, &r);
-    page_put(out,
-             "</div>\n</div>\n<figure><img alt=\"Section through the loaded tissue, coloured by "
-             "shear strain, with the threshold's contour\" src=\"/v1/assessments/");
-    page_put(out, id);
-    page_put(out,
-             "/section.svg\"><figcaption>Symmetry section under load, Green\u2013Lagrange shear "
-             "strain.</figcaption></figure>\n");
+    page_put(out, "</div>\n</div>\n");
+    if (!attached) put_figure(out, row);
     put_notes(out, &request->values);
     return ISCHIA_OK;
 }
@@ -221,7 +228,7 @@ static enum ischia_code put_report(struct text_out *out, const struct store_asse
     page_begin(out, "Ischia: report", queue_is_final(row->state) ? 0 : REFRESH_S);
     page_put(out, "<h1>Tissue under one ischium</h1>\n");
     if (row->state == QUEUE_SUCCEEDED) {
-        TRY(put_result(out, row, &request, err));
+        TRY(put_result(out, row, &request, false, err));
     } else {
         if (queue_is_final(row->state))
             put_failure(out, row);
@@ -232,6 +239,30 @@ static enum ischia_code put_report(struct text_out *out, const struct store_asse
     }
     page_end(out);
     return ISCHIA_OK;
+}
+
+enum ischia_code report_attachment(char **ret, const struct store_assessment *row,
+                                   struct ischia_error *err)
+{
+    struct ischia_request request;
+    struct text_out out;
+    enum ischia_code code = ISCHIA_OK;
+    TRY(documents_request(&request, row, err));
+    text_out_init(&out);
+    page_put(&out,
+             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Ischia: "
+             "report</title></head>\n<body>\n<h1>Tissue under one ischium</h1>\n");
+    if (row->state == QUEUE_SUCCEEDED) {
+        code = put_result(&out, row, &request, true, err);
+    } else {
+        put_failure(&out, row);
+        put_identity(&out, row, &request);
+        put_inputs(&out, &request);
+    }
+    page_put(&out, "</body></html>\n");
+    if (code == ISCHIA_OK) return text_out_take(&out, ret, NULL, err);
+    text_out_finish(&out);
+    return code;
 }
 
 void handle_report(struct call *call, struct http_response *ret)
