@@ -14,6 +14,7 @@ static const char *const issue_of_kind[PROBLEM_KIND_COUNT] = {
     [PROBLEM_NOT_ACCEPTABLE] = "not-supported",
     [PROBLEM_TIMEOUT] = "timeout",
     [PROBLEM_CONFLICT] = "conflict",
+    [PROBLEM_PRECONDITION] = "incomplete",
     [PROBLEM_TOO_LARGE] = "too-long",
     [PROBLEM_MEDIA_TYPE_WRONG] = "not-supported",
     [PROBLEM_INVALID] = "invalid",

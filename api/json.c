@@ -190,7 +190,10 @@ size_t json_count(const struct json *value)
     return count;
 }
 
-const struct json *json_first(const struct json *value) { return opaque(node(value)->child); }
+const struct json *json_first(const struct json *value)
+{
+    return value == NULL ? NULL : opaque(node(value)->child);
+}
 
 const struct json *json_next(const struct json *member) { return opaque(node(member)->next); }
 

@@ -70,10 +70,10 @@ const char *json_key(const struct json *member);   /* of a member of an object; 
 size_t json_count(const struct json *value);       /* of an array's or object's members     */
 
 /* Members in document order: for (m = json_first(v); m != NULL; m = json_next(m)). NULL for an
- * empty one and for values that are neither array nor object. */
+ * empty one, for values that are neither array nor object, and for NULL. */
 const struct json *json_first(const struct json *value);
 const struct json *json_next(const struct json *member);
-/* The first member with this key, NULL when there is none or object is not an object. */
+/* The first member with this key, NULL when there is none or object is NULL or not an object. */
 const struct json *json_member(const struct json *object, const char *key);
 
 const char *json_library_version(void); /* of cJSON, as it runs: "1.7.15" */

@@ -67,6 +67,9 @@ const struct config_option config_options[] = {
     TEXT(public_url, "",
          "Address under which others reach this service, as https://host: in links of FHIR "
          "resources, cards, messages and webhooks; empty: that of the request."),
+    TEXT(cds_issuers, "",
+         "JSON file with the issuers and keys whose signed tokens CDS services take, instead of "
+         "access tokens; empty: access tokens. Needs public_url."),
     NUMBER("http_threads", http_threads, "threads", 0, 256, "0", false,
            "Threads that answer requests; 0: one a processor core, at most 8."),
     NUMBER("connections", connections, "connections", 16, 1000000, "4096", false,
@@ -373,10 +376,28 @@ enum ischia_code config_read_environment(struct config *config, char *const *env
     return ISCHIA_OK;
 }
 
+/* "" or http(s)://host with an optional path, without anything that must be escaped. */
+static bool url_is_plain(const char *url)
+{
+    const size_t length = strlen(url);
+    if (length == 0) return true;
+    if (strncmp(url, "http://", 7) != 0 && strncmp(url, "https://", 8) != 0) return false;
+    for (const char *c = url; *c != '\0'; c++)
+        if ((unsigned char)*c <= 0x20 || (unsigned char)*c >= 0x7f ||
+            strchr("\"<>?#\\", *c) != NULL)
+            return false;
+    return url[length - 1] != '/';
+}
+
 enum ischia_code config_check(const struct config *config, struct ischia_error *err)
 {
     CHECK((config->tls_certificate[0] == '\0') == (config->tls_key[0] == '\0'), err, ISCHIA_E_INPUT,
           "tls_certificate and tls_key go together: set both or neither");
+    CHECK(config->cds_issuers[0] == '\0' || config->public_url[0] != '\0', err, ISCHIA_E_INPUT,
+          "cds_issuers needs public_url: tokens are made out for an address");
+    CHECK(url_is_plain(config->public_url), err, ISCHIA_E_INPUT,
+          "public_url is '%.80s'; write https://host without a slash at the end",
+          config->public_url);
     CHECK(config->listen[0] != '\0', err, ISCHIA_E_INPUT, "listen is empty");
     CHECK(config->state_dir[0] != '\0', err, ISCHIA_E_INPUT, "state_dir is empty");
     CHECK(config->connections_per_address <= config->connections, err, ISCHIA_E_INPUT,

@@ -29,6 +29,7 @@ struct config {
     char allowed_origins[CONFIG_TEXT_BYTES];
     char worker_program[CONFIG_TEXT_BYTES];
     char public_url[CONFIG_TEXT_BYTES];
+    char cds_issuers[CONFIG_TEXT_BYTES];
     bool behind_proxy;
     bool sandbox;
     int workers;

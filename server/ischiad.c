@@ -20,6 +20,7 @@
 #include "server/metrics.h"
 #include "server/notify.h"
 #include "server/sandbox.h"
+#include "server/textfile.h"
 
 /*
  * The daemon. main reads the options; serve is a chain of steps, each with its undoing, and the
@@ -27,7 +28,7 @@
  */
 
 enum { EXIT_USAGE = 2, TICK_MS = 1000, RETIRE_EVERY_S = 60, RETIRE_BATCH = 200 };
-enum { SWEEP_AGE_MS = 5 * 60 * 1000, TLS_FILE_BYTES = 256 * 1024 };
+enum { SWEEP_AGE_MS = 5 * 60 * 1000 };
 
 extern char **environ;
 
@@ -147,30 +148,12 @@ static enum ischia_code load_config(struct config *ret, const struct arguments *
 
 /* ----------------------------------------------------------------------------- steps */
 
-static enum ischia_code read_text(const char *path, char **ret, struct ischia_error *err)
-{
-    char *text = calloc(1, TLS_FILE_BYTES);
-    CHECK(text != NULL, err, ISCHIA_E_MEMORY, "no memory for %s", path);
-    FILE *file = fopen(path, "re");
-    if (file == NULL) {
-        free(text);
-        return FAIL(err, ISCHIA_E_IO, "cannot open %s: %s", path, strerror(errno));
-    }
-    const size_t size = fread(text, 1, TLS_FILE_BYTES - 1, file);
-    const bool good = ferror(file) == 0 && size > 0;
-    (void)fclose(file);
-    if (!good) free(text);
-    CHECK(good, err, ISCHIA_E_IO, "cannot read %s", path);
-    *ret = text;
-    return ISCHIA_OK;
-}
-
 static enum ischia_code load_tls(struct daemon *d, struct ischia_error *err)
 {
     const struct config *config = &d->service.config;
     if (config->tls_certificate[0] == '\0') return ISCHIA_OK;
-    TRY(read_text(config->tls_certificate, &d->tls_certificate, err));
-    return read_text(config->tls_key, &d->tls_key, err);
+    TRY(textfile_read(config->tls_certificate, &d->tls_certificate, err));
+    return textfile_read(config->tls_key, &d->tls_key, err);
 }
 
 /* As many descriptors as the system lets us: each connection is one. */
@@ -238,6 +221,7 @@ static enum ischia_code create_parts(struct daemon *d, struct ischia_error *err)
     TRY(auth_create(&s->auth, s->store, err));
     TRY(audit_create(&s->audit, s->store, err));
     TRY(rate_create(&s->rate, err));
+    if (s->config.cds_issuers[0] != '\0') TRY(trust_create(&s->trust, s->config.cds_issuers, err));
     return documents_create(&s->documents, err);
 }
 
@@ -466,6 +450,7 @@ static void finish(struct daemon *d)
     http_destroy(s->http);
     events_destroy(s->events);
     documents_destroy(s->documents);
+    trust_destroy(s->trust);
     rate_destroy(s->rate);
     audit_destroy(s->audit);
     auth_destroy(s->auth);

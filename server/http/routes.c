@@ -39,6 +39,17 @@ enum { CASE_BYTES_MAX = 64 * 1024, EMPTY_BODY_BYTES_MAX = 1024, ROUTES_MAX = 64 
         HTTP_GET, "/fhir/" type, "GET /fhir/" type, handle_fhir_search, AUTH_READ, 0, NULL,        \
             FHIR_TYPES, fhir_search_keys, "assessment.list", false                                 \
     }
+#define CDS_HOOK(id)                                                                               \
+    {                                                                                              \
+        HTTP_POST, "/cds-services/" id, "POST /cds-services/" id, handle_cds_hook, AUTH_READ,      \
+            RECORD_BYTES_MAX, TYPES(JSON), TYPES(JSON), NULL, "cds.hook", false                    \
+    }
+#define CDS_FEEDBACK(id)                                                                           \
+    {                                                                                              \
+        HTTP_POST, "/cds-services/" id "/feedback", "POST /cds-services/" id "/feedback",          \
+            handle_cds_feedback, AUTH_READ, RECORD_BYTES_MAX, TYPES(JSON), TYPES(JSON), NULL,      \
+            "cds.feedback", false                                                                  \
+    }
 #define FHIR_POST_SEARCH(type)                                                                     \
     {                                                                                              \
         HTTP_POST, "/fhir/" type "/_search", "POST /fhir/" type "/_search", handle_fhir_search,    \
@@ -99,6 +110,12 @@ const struct route routes[] = {
     FHIR_DEFINITION("OperationDefinition"),
     FHIR_DEFINITION("CodeSystem"),
     FHIR_DEFINITION("StructureDefinition"),
+    {HTTP_GET, "/cds-services", "GET /cds-services", handle_cds_discovery, 0, 0, NULL, TYPES(JSON),
+     NULL, NULL, false},
+    CDS_HOOK("ischia-patient-view"),
+    CDS_FEEDBACK("ischia-patient-view"),
+    CDS_HOOK("ischia-order-select"),
+    CDS_FEEDBACK("ischia-order-select"),
     {HTTP_GET, "/docs", "GET /docs", handle_docs, 0, 0, NULL, TYPES("text/html"), NULL, NULL, true},
     {HTTP_GET, "/", "GET /", handle_home, 0, 0, NULL, TYPES("text/html"), TYPES("from"), NULL,
      true},
