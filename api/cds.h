@@ -28,8 +28,8 @@ struct cds_request {
     char measured_at[ISCHIA_MEASURED_AT_BYTES]; /* of its newest measurement of ours; "": none */
 };
 
-/* Reads the body of a hook. Good when the code is ISCHIA_OK and no fault was added; has_observations
- * false is for the caller to refuse (412). Errors as json_parse with json_limits_record. */
+/* Reads the body of a hook. Good when the code is ISCHIA_OK and no fault was added; without
+ * has_observations the caller refuses it (412). Errors as json_parse with json_limits_record. */
 ISCHIA_MUST_CHECK enum ischia_code cds_read(struct cds_request *ret, enum cds_service service,
                                             const char *json, size_t length,
                                             struct doc_faults *faults, struct ischia_error *err);

@@ -7,58 +7,19 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/case_places.h"
 #include "api/fhir.h"
 #include "api/measure.h"
 #include "api/ucum.h"
 
-enum { KEYS_MAX = 16 };
-
 struct reader {
     struct fhir_input *input;
-    struct case_doc_fields fields;
-    struct doc_faults found;   /* of fields: pointers are "/muM"          */
-    struct doc_faults *faults; /* of the document: pointers are FHIRPath  */
-    struct {
-        char key[16], where[DOC_POINTER_BYTES];
-    } place[KEYS_MAX];
-    int place_count;
+    struct case_places places;
+    struct doc_faults *faults;    /* of the document: pointers are FHIRPath  */
     enum ischia_side bundle_side; /* of the Observations' bodySite */
     bool has_subject;
     bool is_bundle; /* the body itself is one */
 };
-
-static const char *where_of(const struct reader *r, const char *key)
-{
-    for (int i = 0; i < r->place_count; i++)
-        if (strcmp(r->place[i].key, key) == 0) return r->place[i].where;
-    return NULL;
-}
-
-static void set_field(struct reader *r, const char *key, const char *value, const char *where)
-{
-    if (r->place_count < KEYS_MAX && where_of(r, key) == NULL) {
-        (void)snprintf(r->place[r->place_count].key, sizeof r->place[0].key, "%s", key);
-        (void)snprintf(r->place[r->place_count].where, sizeof r->place[0].where, "%s", where);
-        r->place_count++;
-    }
-    case_doc_fields_set(&r->fields, key, value);
-}
-
-/* The faults of the fields, with places in the FHIR document. */
-static void move_faults(struct reader *r)
-{
-    char where[DOC_POINTER_BYTES];
-    for (size_t i = 0; i < r->found.count; i++) {
-        const struct ischia_fault *f = &r->found.item[i];
-        const char *key = f->pointer[0] == '/' ? f->pointer + 1 : f->pointer;
-        const char *place = where_of(r, key);
-        if (r->is_bundle)
-            (void)snprintf(where, sizeof where, "Bundle.entry.resource");
-        else
-            (void)snprintf(where, sizeof where, "Parameters.parameter.where(name='%.8s')", key);
-        doc_faults_add(r->faults, place == NULL ? where : place, f->code, "%s", f->detail);
-    }
-}
 
 /* ---- values ---- */
 
@@ -99,25 +60,36 @@ static bool quantity_is_plain(struct reader *r, const struct json *q, const char
     return false;
 }
 
-static void read_quantity(struct reader *r, const struct json *q, int param, const char *where)
+/* The digits of a number in the canonical unit; false with a fault. */
+static bool take_quantity(struct reader *r, const struct json *q, int param, const char *where,
+                          char ret[UCUM_DIGITS_BYTES])
 {
-    char digits[UCUM_DIGITS_BYTES], known[96], shown[24];
+    char known[96], shown[24];
     const char *unit = ischia_params[param].unit, *key = ischia_params[param].key;
     if (!is_object(q)) {
         doc_faults_add(r->faults, where, "wrong_type", "%s is not a Quantity", key);
-        return;
+        return false;
     }
-    if (is_modified(r, q, where) || !quantity_is_plain(r, q, where)) return;
+    if (is_modified(r, q, where) || !quantity_is_plain(r, q, where)) return false;
     const char *given = json_digits(json_member(q, "value")), *code = text_of(q, "code");
-    if (ucum_convert(given, code, unit, digits) != UCUM_CONVERTED) {
+    if (ucum_convert(given, code, unit, ret) != UCUM_CONVERTED) {
         doc_faults_add(r->faults, where, "unsupported", "%s is in '%s'; accepted %s", key,
                        text_printable(code, shown, sizeof shown),
                        ucum_known(unit, known, sizeof known));
-        return;
+        return false;
     }
     if (strcmp(code, unit) == 0 && strlen(given) < ORIGIN_DIGITS_BYTES)
         (void)snprintf(r->input->origin.digits[param], ORIGIN_DIGITS_BYTES, "%s", given);
-    set_field(r, key, digits, where);
+    return true;
+}
+
+static void read_quantity(struct reader *r, const struct json *q, int param, const char *where)
+{
+    char digits[UCUM_DIGITS_BYTES];
+    if (take_quantity(r, q, param, where, digits))
+        case_places_set(&r->places, ischia_params[param].key, digits, where);
+    else
+        case_places_refuse(&r->places, ischia_params[param].key, where);
 }
 
 /* ---- the person ---- */
@@ -320,7 +292,7 @@ static void read_named(struct reader *r, const struct json *parameter, const str
     for (size_t i = 0; i < sizeof named->values / sizeof named->values[0]; i++) {
         const char *value = named->values[i] == NULL ? NULL : text_of(parameter, named->values[i]);
         if (value == NULL) continue;
-        set_field(r, named->name, value, where);
+        case_places_set(&r->places, named->name, value, where);
         return;
     }
     doc_faults_add(r->faults, where, "wrong_type", "%s is not a %s", named->name, named->values[0]);
@@ -395,7 +367,7 @@ static void settle_side(struct reader *r)
     enum ischia_side *side = &r->input->request.side;
     if (*side == ISCHIA_SIDE_NONE) *side = r->bundle_side;
     if (r->bundle_side != ISCHIA_SIDE_NONE && *side != r->bundle_side)
-        doc_faults_add(r->faults, where_of(r, "side"), "inconsistent",
+        doc_faults_add(r->faults, case_places_find(&r->places, "side"), "inconsistent",
                        "side is not that of the Observations' bodySite");
 }
 
@@ -412,9 +384,10 @@ static void read_root(struct reader *r, const struct json *root)
                        "the body is neither Parameters nor a Bundle of Observations");
         return;
     }
-    case_doc_fields_end(&r->fields);
+    case_places_end(&r->places, r->faults,
+                    r->is_bundle ? "Bundle.entry.resource" : "Parameters.parameter.where(name='",
+                    r->is_bundle ? NULL : "')");
     settle_side(r);
-    move_faults(r);
 }
 
 enum ischia_code fhir_read_assess(struct fhir_input *ret, const char *json, size_t length,
@@ -427,8 +400,7 @@ enum ischia_code fhir_read_assess(struct fhir_input *ret, const char *json, size
     memset(&r, 0, sizeof r);
     r.input = ret;
     r.faults = faults;
-    doc_faults_init(&r.found);
-    case_doc_fields_init(&r.fields, &ret->request, &r.found);
+    case_places_init(&r.places, &ret->request);
     const enum ischia_code code = json_keep_digits(root, json, length, err);
     if (code == ISCHIA_OK) read_root(&r, root);
     json_destroy(root);

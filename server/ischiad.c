@@ -13,6 +13,7 @@
 
 #include "server/admin.h"
 #include "server/config.h"
+#include "server/hl7/listener.h"
 #include "server/http/listen.h"
 #include "server/http/routes.h"
 #include "server/http/service.h"
@@ -36,6 +37,8 @@ struct daemon {
     struct service service;
     struct arguments *arguments;
     char *tls_certificate, *tls_key; /* PEM texts */
+    struct link_tls *hl7_tls;        /* NULL: plain */
+    struct listener *hl7;            /* NULL: off   */
     char worker_program[PATH_MAX];
     int64_t retire_at_ms, watchdog_at_ms;
 };
@@ -329,6 +332,49 @@ static enum ischia_code start_http(struct daemon *d, struct ischia_error *err)
     return http_start(&d->service.http, &options, &app, err);
 }
 
+/* HL7 v2 says nothing about who may send: beyond this machine a certificate has to. */
+static enum ischia_code check_hl7_access(const struct config *config, struct ischia_error *err)
+{
+    bool loopback = false;
+    if (config->hl7_listen[0] == '\0') return ISCHIA_OK;
+    TRY(listen_is_loopback(config->hl7_listen, &loopback, err));
+    CHECK(
+        loopback || config->behind_proxy || (config->hl7_tls && config->hl7_client_ca[0] != '\0'),
+        err, ISCHIA_E_INPUT,
+        "%s is not a loopback address: set hl7_tls and hl7_client_ca, or give --behind-proxy when "
+        "something else does access control",
+        config->hl7_listen);
+    return ISCHIA_OK;
+}
+
+static enum ischia_code load_hl7_tls(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    char *ca = NULL;
+    if (!config->hl7_tls) return ISCHIA_OK;
+    if (config->hl7_client_ca[0] != '\0') TRY(textfile_read(config->hl7_client_ca, &ca, err));
+    const enum ischia_code code =
+        link_tls_create(&d->hl7_tls, d->tls_certificate, d->tls_key, ca, err);
+    free(ca);
+    return code;
+}
+
+static enum ischia_code start_hl7(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    if (config->hl7_listen[0] == '\0') return ISCHIA_OK;
+    TRY(check_hl7_access(config, err));
+    TRY(load_hl7_tls(d, err));
+    const struct listener_options options = {.listen = config->hl7_listen,
+                                             .application = config->hl7_application,
+                                             .facility = config->hl7_facility,
+                                             .tls = d->hl7_tls,
+                                             .queue_limit = config->queue_limit,
+                                             .queue = d->service.queue,
+                                             .audit = d->service.audit};
+    return listener_start(&d->hl7, &options, err);
+}
+
 /* ------------------------------------------------------------------------------ loop */
 
 static void announce(const struct daemon *d)
@@ -338,6 +384,9 @@ static void announce(const struct daemon *d)
     (void)fflush(stdout);
     LOG_INFO("listening", "address=%s://%s version=%s", scheme, http_address(d->service.http),
              ISCHIA_VERSION);
+    if (d->hl7 != NULL)
+        LOG_INFO("listening", "address=mllp://%s tls=%d", listener_address(d->hl7),
+                 d->hl7_tls != NULL);
     (void)notify_manager("READY=1");
 }
 
@@ -436,6 +485,7 @@ static enum ischia_code start(struct daemon *d, struct ischia_error *err)
     service_apply(&d->service);
     TRY(check_access(d, err));
     TRY(start_queue(d, err));
+    TRY(start_hl7(d, err));
     return start_http(d, err);
 }
 
@@ -445,6 +495,7 @@ static void finish(struct daemon *d)
 {
     struct service *s = &d->service;
     http_stop(s->http);
+    listener_stop(d->hl7);
     queue_destroy(s->queue, 0);
     store_close(s->store);
     http_destroy(s->http);
@@ -454,6 +505,7 @@ static void finish(struct daemon *d)
     rate_destroy(s->rate);
     audit_destroy(s->audit);
     auth_destroy(s->auth);
+    link_tls_destroy(d->hl7_tls);
     free(d->tls_certificate);
     free(d->tls_key);
 }
@@ -520,6 +572,7 @@ static int check(const struct config *config)
                     "%s is not a loopback address: set tls_certificate and tls_key, or "
                     "behind_proxy",
                     config->listen);
+    if (code == ISCHIA_OK) code = check_hl7_access(config, &err);
     free(d.tls_certificate);
     free(d.tls_key);
     if (code != ISCHIA_OK) return complain(&err);
