@@ -20,6 +20,7 @@
 #include "server/log.h"
 #include "server/metrics.h"
 #include "server/notify.h"
+#include "server/outbound/outbound.h"
 #include "server/sandbox.h"
 #include "server/textfile.h"
 
@@ -39,6 +40,7 @@ struct daemon {
     char *tls_certificate, *tls_key; /* PEM texts */
     struct link_tls *hl7_tls;        /* NULL: plain */
     struct listener *hl7;            /* NULL: off   */
+    struct outbound *outbound;
     char worker_program[PATH_MAX];
     int64_t retire_at_ms, watchdog_at_ms;
 };
@@ -276,8 +278,9 @@ static void on_finished(void *context, const struct uuid *id, enum queue_state s
     };
     char text[UUID_TEXT_BYTES];
     struct log_value quoted;
-    (void)context;
+    const struct daemon *d = context;
     uuid_format(id, text);
+    if (queue_is_final(state)) outbound_wake(d->outbound);
     if (queue_is_final(state)) metrics_solve(outcomes[state], (double)wall_ms / 1e3);
     LOG_INFO("assessment ended", "id=%s status=%s end=%s wall_ms=%lld detail=%s", text,
              queue_state_names[state], pool_end_names[end], (long long)wall_ms,
@@ -484,6 +487,7 @@ static enum ischia_code start(struct daemon *d, struct ischia_error *err)
     TRY(create_parts(d, err));
     service_apply(&d->service);
     TRY(check_access(d, err));
+    TRY(outbound_create(&d->outbound, &d->service.config, d->service.store, err));
     TRY(start_queue(d, err));
     TRY(start_hl7(d, err));
     return start_http(d, err);
@@ -497,6 +501,7 @@ static void finish(struct daemon *d)
     http_stop(s->http);
     listener_stop(d->hl7);
     queue_destroy(s->queue, 0);
+    outbound_destroy(d->outbound);
     store_close(s->store);
     http_destroy(s->http);
     events_destroy(s->events);

@@ -41,6 +41,8 @@ void jose_key_destroy(struct jose_key *key)
 const char *jose_key_algorithm(const struct jose_key *key) { return key->algorithm; }
 const char *jose_key_id(const struct jose_key *key) { return key->id; }
 
+const char *jose_library_version(void) { return gnutls_check_version(NULL); }
+
 /* ---------------------------------------------------------------------------- reading */
 
 static const char *text_of(const struct json *object, const char *key)

@@ -29,6 +29,8 @@ void jose_key_destroy(struct jose_key *key); /* NULL allowed */
 const char *jose_key_algorithm(const struct jose_key *key); /* "ES384", "RS384" */
 const char *jose_key_id(const struct jose_key *key);        /* "kid"; "" when it has none */
 
+const char *jose_library_version(void); /* of GnuTLS, as it runs: "3.7.9" */
+
 /* True when signature (as JWS has it: r and s behind each other, or RSA's) is that of the text by
  * this public key. May be called from several threads. */
 bool jose_verify(struct jose_key *key, const char *text, size_t length,

@@ -8,6 +8,8 @@
 
 #include "api/json.h"
 #include "server/http/http.h"
+#include "server/jose.h"
+#include "server/outbound/web.h"
 #include "server/store/store.h"
 
 const struct version *versions(void)
@@ -17,6 +19,8 @@ const struct version *versions(void)
         {"libmicrohttpd", http_library_version},
         {"libsodium", sodium_version_string},
         {"zlib", zlibVersion},
+        {"GnuTLS", jose_library_version},
+        {"libcurl", web_library_version},
         {"cJSON", json_library_version},
         {"glibc", gnu_get_libc_version},
         {NULL, NULL},

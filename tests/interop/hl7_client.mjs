@@ -18,8 +18,7 @@ function observations(message) {
 if (process.argv[2] === 'parse') {
   const message = new Message({ text: input.text });
   console.log(JSON.stringify({
-    type: message.get('MSH.9').toString(),
-    pid: message.get('PID.3').toString(),
+    type: message.get('MSH.9.1').toString(),
     observations: observations(message),
   }));
 } else {

@@ -2,9 +2,10 @@
 //
 // Usage: node jwt.mjs < wish.json
 // wish: { keys: { name: "ES384"|"RS384"|"ES256"|"RS1024" }, tokens: [{ key, alg, kid, claims }] }
+//        node jwt.mjs verify < { token, jwk }     prints { head, claims, valid }
 // Prints { jwks: { name: JWK }, pem: { name: PEM }, tokens: [compact form] }. Node's own
 // cryptography signs, so that the daemon's is checked by another's.
-import { createHmac, generateKeyPairSync, sign } from 'node:crypto';
+import { createHmac, createPublicKey, generateKeyPairSync, sign, verify } from 'node:crypto';
 import { readFileSync } from 'node:fs';
 
 const kinds = {
@@ -14,6 +15,17 @@ const kinds = {
   RS1024: ['rsa', { modulusLength: 1024 }],
 };
 const wish = JSON.parse(readFileSync(0, 'utf8'));
+if (process.argv[2] === 'verify') {
+  const [head, claims, signature] = wish.token.split('.');
+  const key = { key: createPublicKey({ key: wish.jwk, format: 'jwk' }), dsaEncoding: 'ieee-p1363' };
+  const text = (part) => JSON.parse(Buffer.from(part, 'base64url'));
+  console.log(JSON.stringify({
+    head: text(head),
+    claims: text(claims),
+    valid: verify('sha384', Buffer.from(`${head}.${claims}`), key, Buffer.from(signature, 'base64url')),
+  }));
+  process.exit(0);
+}
 const made = Object.fromEntries(
   Object.entries(wish.keys).map(([name, kind]) => [name, generateKeyPairSync(...kinds[kind])]));
 const b64 = (value) => Buffer.from(JSON.stringify(value)).toString('base64url');
