@@ -3,10 +3,12 @@
 import filecmp
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import time  # noqa: F401  for the tests
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.join(HERE, '../..')
@@ -45,6 +47,14 @@ def node(script, *arguments, **options):
         timeout=120,
         **options,
     )
+
+
+def mapping():
+    """The table of docs/INTEGRATION.md: every number that travels."""
+    with open(os.path.join(ROOT, 'docs/INTEGRATION.md'), encoding='utf-8') as file:
+        text = file.read()
+    rows = re.findall(r'^\| `(\w+)` \| (in|out) \| `([^`]+)` \| `([^`]+)` \|', text, re.M)
+    return [dict(zip(('code', 'way', 'unit', 'v1'), row)) for row in rows]
 
 
 def quantity(value, unit):
