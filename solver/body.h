@@ -3,21 +3,27 @@
 #define ISCHIA_SOLVER_BODY_H
 
 #include "solver/assembly.h"
+#include "solver/element_batch.h"
 
 /* A mesh with its materials: elastic energy, gradient and Hessian of the whole. */
 
-struct element_volume {            /* what the tracked pressure of an element is carried on with */
-    double gradient[3][HEX_NODES]; /* dv/du, mm2                   */
-    double pressure_MPa;           /* kappa (v / V - 1) back then  */
+/* What the tracked pressures of a batch are carried on with. */
+struct body_volume {
+    double gradient[3][HEX_NODES][BATCH]; /* dv/du, mm2                   */
+    double pressure_MPa[BATCH];           /* kappa (v / V - 1) back then  */
 };
 
+/*
+ * Element e is in lane e % BATCH of batch e / BATCH; what is left of the last batch repeats the
+ * last element.
+ */
 struct body {
     const struct mesh *mesh;
-    struct element_reference *reference; /* [element_count]                             */
-    struct element_material
-        material[TISSUE_COUNT];    /* by mesh->tissue                             */
-    double *pressure_MPa;          /* [element_count] tracked, for the Hessian    */
-    struct element_volume *volume; /* [element_count] of the last Hessian         */
+    struct element_material material[TISSUE_COUNT]; /* by mesh->tissue                          */
+    int batch_count;
+    struct element_batch *batch; /* [batch_count]                                               */
+    double *pressure_MPa;        /* [batch_count * BATCH] by element: tracked, for the Hessian   */
+    struct body_volume *volume;  /* [batch_count] of the last Hessian                            */
 };
 
 /* At rest, tracked pressures zero. The mesh must outlive it. ISCHIA_E_MEMORY. */

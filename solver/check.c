@@ -71,6 +71,24 @@ static void check_law(struct comparison *c, const char *state, const double stre
     report(c, "Ogden tangent", state, second.difference, second.scale);
 }
 
+/* The quotients of the gradient by themselves, or as their limit where two stretches are equal. */
+static void check_quotients(struct comparison *c, const char *state, const double s[3])
+{
+    static const double mu = 0.008, pressure = 0.03, equal = 1e-6;
+    struct ogden_derivatives d;
+    struct extremes even = {0, mu}, odd = {0, mu};
+    ogden_derivatives(mu, pressure, s, &d);
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        const double *g = d.gradient, gap = s[i] - s[j];
+        note(&even, d.even[k],
+             fabs(gap) < equal ? d.normal[i][i] - d.normal[i][j] : (g[i] - g[j]) / gap);
+        note(&odd, d.odd[k], (g[i] + g[j]) / (s[i] + s[j]));
+    }
+    report(c, "Ogden even quotients", state, even.difference, even.scale);
+    report(c, "Ogden odd quotients", state, odd.difference, odd.scale);
+}
+
 /* --- element ---------------------------------------------------------------------------------- */
 
 static const double brick[HEX_NODES][3] = {{0, 0, 0},        {2.1, 0.1, 0}, {2.0, 1.6, 0.2},
@@ -158,14 +176,24 @@ static void distort(double amplitude, double ret_u[HEX_NODES][3])
         for (int k = 0; k < 3; k++) ret_u[n][k] = amplitude * sin(3.0 * n + 2.0 * k + 1);
 }
 
+static const struct {
+    const char *name;
+    double stretch[3];
+} law_states[] = {
+    {"at rest", {1, 1, 1}},
+    {"two equal", {1.7, 1.7, 0.3}},
+    {"nearly equal", {1.2, 1.2 + 1e-9, 0.8}},
+    {"all different", {2.4, 1.6, 0.25}},
+};
+
 enum ischia_code ischia_check_tangents(FILE *out, struct ischia_error *err)
 {
     struct comparison c = {out, true};
     double u[HEX_NODES][3];
-    check_law(&c, "at rest", (const double[3]){1, 1, 1});
-    check_law(&c, "two equal", (const double[3]){1.7, 1.7, 0.3});
-    check_law(&c, "nearly equal", (const double[3]){1.2, 1.2 + 1e-9, 0.8});
-    check_law(&c, "all different", (const double[3]){2.4, 1.6, 0.25});
+    for (size_t k = 0; k < sizeof law_states / sizeof law_states[0]; k++) {
+        check_law(&c, law_states[k].name, law_states[k].stretch);
+        check_quotients(&c, law_states[k].name, law_states[k].stretch);
+    }
     distort(0, u);
     check_element(&c, "at rest", (const double(*)[3])u);
     distort(0.05, u);

@@ -53,6 +53,13 @@ void *realloc(void *old, size_t size)
     return memory;
 }
 
+void *aligned_alloc(size_t alignment, size_t size)
+{
+    void *memory = fails() ? NULL : __libc_memalign(alignment, size);
+    live += memory != NULL;
+    return memory;
+}
+
 /* Never made to fail: only libgomp asks for it, and ends the program when it is refused. */
 void *memalign(size_t alignment, size_t size)
 {
