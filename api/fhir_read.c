@@ -17,7 +17,7 @@ struct reader {
     struct case_places places;
     struct doc_faults *faults;    /* of the document: pointers are FHIRPath  */
     enum ischia_side bundle_side; /* of the Observations' bodySite */
-    bool has_subject;
+    bool has_subject, has_input;
     bool is_bundle; /* the body itself is one */
 };
 
@@ -239,6 +239,7 @@ static void read_observation(struct reader *r, const struct json *observation, c
         doc_faults_add(r->faults, where, "unknown", "'%s' is not a code of " FHIR_MEASURE_SYSTEM,
                        text_printable(code, shown, sizeof shown));
     if (measure < 0 || !measure_is_input(measure)) return; /* results of ours are not inputs */
+    r->has_input = true;
     if (is_modified(r, observation, where) || !has_a_value(r, observation, where)) return;
     take_side(r, observation, where);
     take_time(r, observation);
@@ -263,6 +264,9 @@ static void read_bundle(struct reader *r, const struct json *bundle, const char 
         (void)snprintf(where, sizeof where, "Bundle.entry[%d].resource", index);
         read_observation(r, resource, where);
     }
+    if (!r->has_input)
+        doc_faults_add(r->faults, root, "missing",
+                       "no Observation has a code of " FHIR_MEASURE_SYSTEM " that is an input");
 }
 
 /* ---- Parameters ---- */

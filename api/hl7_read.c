@@ -34,10 +34,10 @@ static bool head_is_ours(const struct reader *r, const char *own_application)
 {
     const struct hl7 *m = r->m;
     const struct hl7_head *head = &r->input->head;
-    char type[16], event[16], version[16], sender[HL7_FIELD_BYTES];
+    char type[16] = "", event[16] = "", version[16] = "", sender[HL7_FIELD_BYTES] = "";
     const bool read =
-        hl7_get(m, 0, 9, 1, type, sizeof type) & hl7_get(m, 0, 9, 2, event, sizeof event) &
-        hl7_get(m, 0, 12, 1, version, sizeof version) & hl7_get(m, 0, 3, 1, sender, sizeof sender);
+        hl7_get(m, 0, 9, 1, type, sizeof type) && hl7_get(m, 0, 9, 2, event, sizeof event) &&
+        hl7_get(m, 0, 12, 1, version, sizeof version) && hl7_get(m, 0, 3, 1, sender, sizeof sender);
     if (head->control_id[0] == '\0')
         doc_faults_add(r->faults, "MSH^1^10", "missing", "MSH-10 (control id) is missing");
     else if (!read || strcmp(type, "ORU") != 0 || strcmp(event, "R01") != 0)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the tests of hospital protocols share: the npm packages, and FHIR bodies of a side."""
+import fcntl
 import filecmp
 import json
 import os
@@ -24,10 +25,16 @@ LATERALITY = {'left': '69030007:272741003=7771000', 'right': '69030007:272741003
 
 
 def install():
-    """npm ci, unless what the lock file names is there already."""
+    """npm ci, unless what the lock file names is there already; one test at a time does it."""
     lock, done = (
         os.path.join(HERE, name) for name in ('package-lock.json', 'node_modules/.ischia-lock')
     )
+    with open(lock, 'rb') as turn:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        install_from(lock, done)
+
+
+def install_from(lock, done):
     if os.path.exists(done) and filecmp.cmp(lock, done, shallow=False):
         return
     subprocess.run(

@@ -216,6 +216,10 @@ class Fhir(unittest.TestCase):
         twice = bundle()
         twice['entry'].append({'resource': observation('R1', 7.2)})
         self.assertEqual([i['code'] for i in self.refused(twice)], ['duplicate'])
+        strange = bundle()
+        for entry in strange['entry']:
+            entry['resource']['code']['coding'][0]['system'] = 'urn:other'
+        self.assertIn('urn:ischia:measure', self.refused(strange)[0]['diagnostics'])
         missing = self.refused(bundle(muM=None))
         self.assertEqual([i['code'] for i in missing], ['required'])
 
