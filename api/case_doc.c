@@ -208,6 +208,7 @@ enum ischia_code case_doc_read_form(struct ischia_request *ret, const char *body
 {
     struct case_doc_fields fields;
     case_doc_fields_init(&fields, ret, faults);
+    fields.typed = true;
     CHECK(length <= bytes_max, err, ISCHIA_E_LIMIT, "the form is larger than the accepted %zu KiB",
           bytes_max / 1024);
     if (length == 0) body = "";

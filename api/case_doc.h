@@ -2,6 +2,7 @@
 #ifndef ISCHIA_API_CASE_DOC_H
 #define ISCHIA_API_CASE_DOC_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "api/faults.h"
@@ -53,8 +54,9 @@ void case_doc_read_value(struct ischia_request *ret, const struct json *value,
 
 /*
  * application/x-www-form-urlencoded. Keys as in JSON; options of the groups as "skin.mu" and
- * "model.friction"; a number is text that JSON would accept as a number (no decimal comma); an
- * empty value is the same as none. ISCHIA_E_INPUT: a broken escape, invalid UTF-8, a NUL.
+ * "model.friction"; a number may be typed as people type it, with a decimal comma or point (see
+ * text_to_typed_number); an empty value is the same as none. ISCHIA_E_INPUT: a broken escape,
+ * invalid UTF-8, a NUL.
  */
 ISCHIA_MUST_CHECK enum ischia_code
 case_doc_read_form(struct ischia_request *ret, const char *body, size_t length, size_t bytes_max,
@@ -68,10 +70,11 @@ struct case_doc_fields {
     struct ischia_request *request;
     struct doc_faults *faults;
     unsigned seen;                      /* bit k: key k of the table was given             */
+    bool typed;                         /* a person typed the numbers; off: as in JSON     */
     double option[ISCHIA_OPTION_COUNT]; /* NaN: not given; applied over the preset at the end */
 };
 void case_doc_fields_init(struct case_doc_fields *ret, struct ischia_request *request,
-                          struct doc_faults *faults);
+                          struct doc_faults *faults); /* not typed */
 void case_doc_fields_set(struct case_doc_fields *fields, const char *key, const char *value);
 void case_doc_fields_end(struct case_doc_fields *fields); /* options, limits, what is missing */
 

@@ -332,12 +332,31 @@ void case_doc_fields_init(struct case_doc_fields *ret, struct ischia_request *re
     for (int i = 0; i < ISCHIA_OPTION_COUNT; i++) ret->option[i] = (double)NAN;
 }
 
+/* Two decimal marks: what was meant cannot be known, so say how to write it. */
+static void refuse_ambiguous(struct case_doc_fields *fields, int key, const char *value)
+{
+    char pointer[DOC_POINTER_BYTES], shown[28];
+    doc_faults_add(fields->faults, key_pointer(key, pointer), "ambiguous",
+                   "%s is \"%s\" with more than one decimal mark; write 1234.5 or 1234,5",
+                   case_key_name(key), text_printable(value, shown, sizeof shown));
+}
+
+static enum text_typed read_number_text(const struct case_doc_fields *fields, const char *value,
+                                        double *ret)
+{
+    if (fields->typed) return text_to_typed_number(value, ret);
+    return text_to_number(value, strlen(value), ret) ? TEXT_TYPED_NUMBER : TEXT_TYPED_NO_NUMBER;
+}
+
 static void set_number_text(struct case_doc_fields *fields, int key, const char *value)
 {
     double number;
     char given[32];
-    if (text_to_number(value, strlen(value), &number))
+    const enum text_typed kind = read_number_text(fields, value, &number);
+    if (kind == TEXT_TYPED_NUMBER)
         case_key_set_number(fields, key, number);
+    else if (kind == TEXT_TYPED_AMBIGUOUS)
+        refuse_ambiguous(fields, key, value);
     else
         case_key_refuse(fields, key, "wrong_type", quoted(value, given, sizeof given));
 }

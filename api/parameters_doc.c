@@ -44,6 +44,7 @@ static void write_parameters(struct json_out *out)
         const struct ischia_param_info *p = &ischia_params[i];
         json_open_object(out, NULL);
         json_put_string(out, "key", p->key);
+        json_put_string(out, "name", p->name);
         write_aliases(out, p->key);
         json_put_string(out, "unit", p->unit);
         json_put_string(out, "description", p->description);

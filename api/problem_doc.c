@@ -76,14 +76,29 @@ void problem_from_error(struct problem *ret, const struct ischia_error *err)
     problem_init(ret, problem_kind_of(err->code), "%s", err->message);
 }
 
+/* Where the load path ended. One that came all the way and failed its checks found an equilibrium
+ * for the whole force: to name the force it came to would read as if it had not. */
+static void put_end_of_path(struct problem *ret, const struct ischia_numerics *n, double F_N)
+{
+    const char *mark = n->detail[0] != '\0' ? ": " : ".";
+    if (n->reason == ISCHIA_DIVERGED_CHECKS)
+        problem_init(ret, PROBLEM_NOT_CONVERGED,
+                     "The whole force of %.4g N was reached, but what was computed failed its "
+                     "checks%s%s",
+                     F_N, mark, n->detail);
+    else
+        problem_init(ret, PROBLEM_NOT_CONVERGED,
+                     "No equilibrium was found beyond %.4g N of %.4g N%s%s", n->last_converged_F_N,
+                     F_N, mark, n->detail);
+}
+
 void problem_from_result(struct problem *ret, const struct ischia_case *c,
                          const struct ischia_result *result)
 {
     const struct ischia_numerics *n = &result->numerics;
     const double F_N = c->param[ISCHIA_F];
     assert(!ischia_result_converged(result));
-    problem_init(ret, PROBLEM_NOT_CONVERGED, "No equilibrium was found beyond %.4g N of %.4g N%s%s",
-                 n->last_converged_F_N, F_N, n->detail[0] != '\0' ? ": " : ".", n->detail);
+    put_end_of_path(ret, n, F_N);
     (void)snprintf(ret->reason, sizeof ret->reason, "%s", ischia_reason_name(n->reason));
     ret->last_converged_fraction = n->last_converged_F_N / F_N;
 }

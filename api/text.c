@@ -126,6 +126,81 @@ bool text_to_number(const char *bytes, size_t length, double *ret_value)
     return true;
 }
 
+/* ---- numbers as people type them ---- */
+
+static const char *const typed_spaces[] = {" ", "\t", "\r", "\n", "\xC2\xA0", "\xE2\x80\xAF"};
+enum { TYPED_SPACE_COUNT = sizeof typed_spaces / sizeof typed_spaces[0] };
+
+/* [*text, *text + result) is the text without the spaces around it. */
+static size_t without_spaces(const char **text)
+{
+    size_t length = strlen(*text);
+    for (int i = 0; i < TYPED_SPACE_COUNT; i++) {
+        const size_t space = strlen(typed_spaces[i]);
+        if (length < space) continue;
+        const bool before = memcmp(*text, typed_spaces[i], space) == 0;
+        if (!before && memcmp(*text + length - space, typed_spaces[i], space) != 0) continue;
+        if (before) *text += space;
+        length -= space;
+        i = -1; /* look for all of them again */
+    }
+    return length;
+}
+
+static bool is_mark(char c) { return c == '.' || c == ','; }
+
+/* Bytes of the digits and marks at the start, none of them needed. */
+static size_t skip_digits_and_marks(const char *bytes, size_t length, int *ret_marks)
+{
+    size_t at = 0;
+    for (*ret_marks = 0; at < length; at++) {
+        if (!is_mark(bytes[at]) && (bytes[at] < '0' || bytes[at] > '9')) break;
+        if (is_mark(bytes[at])) (*ret_marks)++;
+    }
+    return at;
+}
+
+/* A sign, digits with marks among them, an exponent: what strtod() reads once the mark is '.'. */
+static enum text_typed typed_kind(const char *bytes, size_t length)
+{
+    int marks;
+    const size_t sign = length > 0 && (bytes[0] == '+' || bytes[0] == '-') ? 1 : 0;
+    const size_t digits = skip_digits_and_marks(bytes + sign, length - sign, &marks);
+    size_t at = sign + digits;
+    if (digits <= (size_t)marks) return TEXT_TYPED_NO_NUMBER;
+    if (at < length && (bytes[at] == 'e' || bytes[at] == 'E')) {
+        at++;
+        if (at < length && (bytes[at] == '+' || bytes[at] == '-')) at++;
+        const size_t exponent = at;
+        at = skip_digits(bytes, length, exponent);
+        if (at == exponent) return TEXT_TYPED_NO_NUMBER;
+    }
+    if (at != length) return TEXT_TYPED_NO_NUMBER;
+    return marks > 1 ? TEXT_TYPED_AMBIGUOUS : TEXT_TYPED_NUMBER;
+}
+
+enum text_typed text_to_typed_number(const char *text, double *ret_value)
+{
+    static const char minus[] = "\xE2\x88\x92"; /* U+2212 */
+    char copy[TEXT_NUMBER_LENGTH_MAX + 1];
+    size_t length = without_spaces(&text);
+    const bool negative = strncmp(text, minus, sizeof minus - 1) == 0;
+    if (negative) {
+        text += sizeof minus - 2; /* its last byte is where the ASCII sign goes */
+        length -= sizeof minus - 2;
+    }
+    if (length > TEXT_NUMBER_LENGTH_MAX) return TEXT_TYPED_NO_NUMBER;
+    memcpy(copy, text, length);
+    copy[length] = '\0';
+    if (negative) copy[0] = '-';
+    const enum text_typed kind = typed_kind(copy, length);
+    if (kind != TEXT_TYPED_NUMBER) return kind;
+    char *comma = strchr(copy, ',');
+    if (comma != NULL) *comma = '.';
+    *ret_value = strtod(copy, NULL);
+    return kind;
+}
+
 /* ---- UTF-8 ---- */
 
 /* What the first byte of a sequence promises, and the least and greatest second byte: this is

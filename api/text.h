@@ -46,6 +46,13 @@ const char *text_from_number(double value, char buffer[TEXT_NUMBER_BYTES]);
 enum { TEXT_NUMBER_LENGTH_MAX = 60 };
 bool text_to_number(const char *bytes, size_t length, double *ret_value);
 
+/* A number as people type it into a form. A comma and a point both are the decimal mark; "+7",
+ * "007", ".5", "5,", a minus sign U+2212, an exponent, and no-break spaces around it are fine. A
+ * text with more than one mark ("1,234.5") reads in two ways and is refused, never guessed.
+ * *ret_value is set for TEXT_TYPED_NUMBER only, and may then be infinite. */
+enum text_typed { TEXT_TYPED_NUMBER, TEXT_TYPED_AMBIGUOUS, TEXT_TYPED_NO_NUMBER };
+enum text_typed text_to_typed_number(const char *text, double *ret_value);
+
 /* Length of the UTF-8 sequence at bytes (1 ... 4), 0 when it is not valid UTF-8: overlong forms,
  * surrogates and values above U+10FFFF are not. length > 0 (asserted). */
 size_t text_utf8_sequence(const char *bytes, size_t length);

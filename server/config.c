@@ -56,7 +56,8 @@ const struct config_option config_options[] = {
     SWITCH(behind_proxy, "false",
            "A reverse proxy does TLS and access control: any address is allowed, and the client "
            "is the last one in X-Forwarded-For."),
-    TEXT(tls_certificate, "", "PEM file with the certificate chain; turns TLS on."),
+    TEXT(tls_certificate, "",
+         "PEM file with the certificate chain; turns TLS on. SIGHUP reads it and tls_key again."),
     TEXT(tls_key, "", "PEM file with the certificate's private key."),
     TEXT(allowed_hosts, "",
          "Names, separated by commas, that a request's Host may give besides the loopback names "

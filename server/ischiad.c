@@ -17,6 +17,7 @@
 #include "server/http/listen.h"
 #include "server/http/routes.h"
 #include "server/http/service.h"
+#include "server/http/tls.h"
 #include "server/log.h"
 #include "server/metrics.h"
 #include "server/notify.h"
@@ -32,14 +33,11 @@
 enum { EXIT_USAGE = 2, TICK_MS = 1000, RETIRE_EVERY_S = 60, RETIRE_BATCH = 200 };
 enum { SWEEP_AGE_MS = 5 * 60 * 1000 };
 
-extern char **environ;
-
 struct daemon {
     struct service service;
     struct arguments *arguments;
-    char *tls_certificate, *tls_key; /* PEM texts */
-    struct link_tls *hl7_tls;        /* NULL: plain */
-    struct listener *hl7;            /* NULL: off   */
+    struct link_tls *hl7_tls; /* NULL: plain */
+    struct listener *hl7;     /* NULL: off   */
     struct outbound *outbound;
     char worker_program[PATH_MAX];
     int64_t retire_at_ms, watchdog_at_ms;
@@ -153,12 +151,32 @@ static enum ischia_code load_config(struct config *ret, const struct arguments *
 
 /* ----------------------------------------------------------------------------- steps */
 
-static enum ischia_code load_tls(struct daemon *d, struct ischia_error *err)
+static bool uses_tls(const struct config *config) { return config->tls_certificate[0] != '\0'; }
+
+static void log_expiry(time_t expires)
 {
-    const struct config *config = &d->service.config;
-    if (config->tls_certificate[0] == '\0') return ISCHIA_OK;
-    TRY(textfile_read(config->tls_certificate, &d->tls_certificate, err));
-    return textfile_read(config->tls_key, &d->tls_key, err);
+    struct tm parts;
+    char date[32];
+    (void)gmtime_r(&expires, &parts);
+    (void)strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &parts);
+    log_event(expires < time(NULL) ? LOG_LEVEL_WARNING : LOG_LEVEL_INFO, "certificate loaded",
+              "expires=%s", date);
+}
+
+/* At start, and again at each reload: those who renew certificates write into the same files. */
+static enum ischia_code load_tls(const struct config *config, struct ischia_error *err)
+{
+    char *certificate = NULL, *key = NULL;
+    time_t expires = 0;
+    if (!uses_tls(config)) return ISCHIA_OK;
+    enum ischia_code code = textfile_read(config->tls_certificate, &certificate, err);
+    if (code == ISCHIA_OK) code = textfile_read(config->tls_key, &key, err);
+    if (code == ISCHIA_OK) code = tls_set(certificate, key, &expires, err);
+    if (code == ISCHIA_OK) log_expiry(expires);
+    if (key != NULL) explicit_bzero(key, strlen(key));
+    free(certificate);
+    free(key);
+    return code;
 }
 
 /* As many descriptors as the system lets us: each connection is one. */
@@ -236,7 +254,7 @@ static enum ischia_code check_access(struct daemon *d, struct ischia_error *err)
     struct service *s = &d->service;
     TRY(listen_is_loopback(s->config.listen, &s->on_loopback, err));
     if (s->on_loopback || s->config.behind_proxy) return ISCHIA_OK;
-    CHECK(d->tls_certificate != NULL, err, ISCHIA_E_INPUT,
+    CHECK(uses_tls(&s->config), err, ISCHIA_E_INPUT,
           "%s is not a loopback address and TLS is off: set tls_certificate and tls_key, or give "
           "--behind-proxy when a reverse proxy does TLS and access control",
           s->config.listen);
@@ -318,18 +336,45 @@ static int http_thread_count(const struct config *config)
     return cores < 1 ? 1 : cores > MOST ? MOST : (int)cores;
 }
 
+/* Connections stop where descriptors would end, with some left for store and workers: a listening
+ * socket whose connections cannot be taken keeps a thread busy for nothing. */
+static enum ischia_code count_connections(const struct config *config, int *ret,
+                                          struct ischia_error *err)
+{
+    enum { RESERVE = 48, PER_WORKER = 4, PER_THREAD = 4, FEWEST = 16 };
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    const int workers = config->workers > 0 ? config->workers : cores < 1 ? 1 : (int)cores;
+    const int reserve = RESERVE + PER_WORKER * workers + PER_THREAD * http_thread_count(config);
+    struct rlimit limit;
+    *ret = config->connections;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY ||
+        limit.rlim_cur >= (rlim_t)config->connections + (rlim_t)reserve)
+        return ISCHIA_OK;
+    CHECK(limit.rlim_cur >= (rlim_t)(reserve + FEWEST), err, ISCHIA_E_LIMIT,
+          "only %llu open files are allowed; with %d workers at least %d are needed: raise the "
+          "limit (ulimit -n, LimitNOFILE=)",
+          (unsigned long long)limit.rlim_cur, workers, reserve + FEWEST);
+    *ret = (int)limit.rlim_cur - reserve;
+    LOG_WARNING("fewer connections than configured", "connections=%d open_files=%llu", *ret,
+                (unsigned long long)limit.rlim_cur);
+    return ISCHIA_OK;
+}
+
+static int smaller(int a, int b) { return a < b ? a : b; }
+
 static enum ischia_code start_http(struct daemon *d, struct ischia_error *err)
 {
     const struct config *config = &d->service.config;
+    int connections;
+    TRY(count_connections(config, &connections, err));
     const struct http_options options = {
         .listen = config->listen,
         .threads = http_thread_count(config),
-        .connections = config->connections,
-        .connections_per_address = config->connections_per_address,
+        .connections = connections,
+        .connections_per_address = smaller(config->connections_per_address, connections),
         .idle_timeout_s = config->idle_timeout_s,
         .request_timeout_s = config->request_timeout_s,
-        .tls_certificate = d->tls_certificate,
-        .tls_key = d->tls_key,
+        .tls = uses_tls(config),
     };
     const struct http_app app = service_app(&d->service);
     return http_start(&d->service.http, &options, &app, err);
@@ -353,11 +398,15 @@ static enum ischia_code check_hl7_access(const struct config *config, struct isc
 static enum ischia_code load_hl7_tls(struct daemon *d, struct ischia_error *err)
 {
     const struct config *config = &d->service.config;
-    char *ca = NULL;
+    char *certificate = NULL, *key = NULL, *ca = NULL;
     if (!config->hl7_tls) return ISCHIA_OK;
-    if (config->hl7_client_ca[0] != '\0') TRY(textfile_read(config->hl7_client_ca, &ca, err));
-    const enum ischia_code code =
-        link_tls_create(&d->hl7_tls, d->tls_certificate, d->tls_key, ca, err);
+    enum ischia_code code = textfile_read(config->tls_certificate, &certificate, err);
+    if (code == ISCHIA_OK) code = textfile_read(config->tls_key, &key, err);
+    if (code == ISCHIA_OK && config->hl7_client_ca[0] != '\0')
+        code = textfile_read(config->hl7_client_ca, &ca, err);
+    if (code == ISCHIA_OK) code = link_tls_create(&d->hl7_tls, certificate, key, ca, err);
+    free(certificate);
+    free(key);
     free(ca);
     return code;
 }
@@ -382,7 +431,7 @@ static enum ischia_code start_hl7(struct daemon *d, struct ischia_error *err)
 
 static void announce(const struct daemon *d)
 {
-    const char *scheme = d->tls_certificate == NULL ? "http" : "https";
+    const char *scheme = uses_tls(&d->service.config) ? "https" : "http";
     (void)printf("listening on %s://%s\n", scheme, http_address(d->service.http));
     (void)fflush(stdout);
     LOG_INFO("listening", "address=%s://%s version=%s", scheme, http_address(d->service.http),
@@ -405,6 +454,10 @@ static void reload(struct daemon *d)
     } else {
         const size_t others = config_reload(&d->service.config, &fresh, names, sizeof names);
         service_apply(&d->service);
+        if (load_tls(&d->service.config, &err) != ISCHIA_OK)
+            LOG_ERROR("certificate not reloaded; the old one stays", "detail=%s",
+                      log_quote(&quoted, err.message));
+        d->retire_at_ms = 0;
         LOG_INFO("options reloaded", "need_restart=%s",
                  log_quote(&quoted, others == 0 ? "" : names));
     }
@@ -481,7 +534,7 @@ static enum ischia_code start(struct daemon *d, struct ischia_error *err)
 {
     raise_descriptor_limit();
     find_worker(d);
-    TRY(load_tls(d, err));
+    TRY(load_tls(&d->service.config, err));
     TRY(enter_state_dir(d, err));
     TRY(open_store(d, err));
     TRY(create_parts(d, err));
@@ -511,8 +564,7 @@ static void finish(struct daemon *d)
     audit_destroy(s->audit);
     auth_destroy(s->auth);
     link_tls_destroy(d->hl7_tls);
-    free(d->tls_certificate);
-    free(d->tls_key);
+    tls_clear();
 }
 
 static int complain(const struct ischia_error *err)
@@ -567,19 +619,17 @@ static int print_help(void)
 /* What can be said about the options without starting. */
 static int check(const struct config *config)
 {
-    struct daemon d = {.service = {.config = *config}};
     struct ischia_error err;
     bool loopback = false;
-    enum ischia_code code = load_tls(&d, &err);
+    enum ischia_code code = load_tls(config, &err);
+    tls_clear();
     if (code == ISCHIA_OK) code = listen_is_loopback(config->listen, &loopback, &err);
-    if (code == ISCHIA_OK && !loopback && !config->behind_proxy && d.tls_certificate == NULL)
+    if (code == ISCHIA_OK && !loopback && !config->behind_proxy && !uses_tls(config))
         code = FAIL(&err, ISCHIA_E_INPUT,
                     "%s is not a loopback address: set tls_certificate and tls_key, or "
                     "behind_proxy",
                     config->listen);
     if (code == ISCHIA_OK) code = check_hl7_access(config, &err);
-    free(d.tls_certificate);
-    free(d.tls_key);
     if (code != ISCHIA_OK) return complain(&err);
     (void)printf("The options are good.\n");
     return EXIT_SUCCESS;

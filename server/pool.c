@@ -250,11 +250,19 @@ static void act_on_result(struct pool *pool, struct worker *worker, const struct
     end_solve(pool, worker, &outcome);
 }
 
+static void remember_program(struct pool *pool, const char *program)
+{
+    (void)pthread_mutex_lock(&pool->lock);
+    (void)snprintf(pool->stats.program, sizeof pool->stats.program, "%s", program);
+    (void)pthread_mutex_unlock(&pool->lock);
+}
+
 static void act_on(struct pool *pool, struct worker *worker, const struct worker_report *report)
 {
     switch (report->news) {
     case NEWS_READY:
-        note(pool, POOL_NOTE_READY, worker, worker->process.pid, "");
+        remember_program(pool, report->text);
+        note(pool, POOL_NOTE_READY, worker, worker->process.pid, report->text);
         become_idle(worker);
         return;
     case NEWS_PROGRESS:
@@ -550,7 +558,7 @@ static struct pool_options with_defaults(const struct pool_options *given)
     options.render_workers = default_to(given->render_workers, 1);
     options.solve_deadline_ms = default_to(given->solve_deadline_ms, 15 * 60 * 1000);
     options.render_deadline_ms = default_to(given->render_deadline_ms, 60 * 1000);
-    options.hello_deadline_ms = default_to(given->hello_deadline_ms, 10 * 1000);
+    options.hello_deadline_ms = default_to(given->hello_deadline_ms, 30 * 1000);
     options.backoff_min_ms = default_to(given->backoff_min_ms, 100);
     options.backoff_max_ms = default_to(given->backoff_max_ms, 10 * 1000);
     options.render_idle_ms = default_to(given->render_idle_ms, 60 * 1000);

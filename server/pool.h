@@ -30,7 +30,7 @@ struct pool_options {
     size_t memory_max_bytes;    /* RLIMIT_DATA of each worker; 0: no limit                    */
     int solve_deadline_ms;      /* from the job's sending to its outcome; 0: 15 minutes       */
     int render_deadline_ms;     /* 0: 60 s                                                    */
-    int hello_deadline_ms;      /* from start to hello; 0: 10 s                               */
+    int hello_deadline_ms;      /* from start to hello; 0: 30 s                               */
     int backoff_min_ms;         /* pause after a worker's death, doubled while they keep dying */
     int backoff_max_ms;         /* 0, 0: 100 ms, 10 s                                         */
     int render_idle_ms;         /* an idle render worker leaves after this; 0: 60 s           */
@@ -132,6 +132,8 @@ ISCHIA_MUST_CHECK enum ischia_code pool_render(struct pool *pool, enum pool_rend
                                                size_t field_size, pool_render_done *done,
                                                void *context, struct ischia_error *err);
 
+enum { POOL_PROGRAM_BYTES = 96 };
+
 struct pool_stats {
     int workers; /* solve workers wanted                                                     */
     int ready;   /* of them, idle after hello                                                */
@@ -139,6 +141,8 @@ struct pool_stats {
     uint64_t started, died, cancelled, deadlines, protocol_errors; /* since create            */
     uint64_t renders, renders_failed;
     int renders_waiting;
+    char program[POOL_PROGRAM_BYTES]; /* what the worker that came last calls itself: program and
+                                         libraries; "" before the first hello           */
 };
 
 /* What the pool is doing now and has done since it was created. Any thread. */

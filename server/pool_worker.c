@@ -55,6 +55,7 @@ static enum ischia_code hear_hello(struct worker *worker, const struct message *
           message->protocol, message->model, message->model_version, FRAME_PROTOCOL_VERSION,
           ISCHIA_MODEL_NAME, ISCHIA_MODEL_VERSION);
     ret->news = NEWS_READY;
+    (void)stpcpy(ret->text, message->program);
     return ISCHIA_OK;
 }
 

@@ -89,7 +89,7 @@ enum worker_news {
 struct worker_report {
     enum worker_news news;
     struct pool_progress progress;
-    char text[MESSAGE_TEXT_BYTES];
+    char text[MESSAGE_TEXT_BYTES]; /* of progress; of what a ready worker calls itself   */
     struct frame frame;
 };
 

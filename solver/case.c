@@ -8,16 +8,24 @@
 /* Studied ranges: the smallest and largest values of Tables 1 and 2 of Macron et al. (2020). */
 const struct ischia_param_info ischia_params[ISCHIA_PARAM_COUNT] = {
     [ISCHIA_R1] = {"R1", "mm", 3, 15, 4.8, 9,
-                   "Smaller radius of curvature of the ischium at its lowest point."},
+                   "Radius of curvature of the ischium at its lowest point, in the plane where it "
+                   "is smallest.",
+                   "Smaller bone radius"},
     [ISCHIA_R2] = {"R2", "mm", 8, 120, 15, 63.3,
-                   "Radius of curvature of the ischium in the orthogonal plane; at least R1."},
+                   "Radius of curvature of the ischium in the plane at right angles to that of "
+                   "R1; at least R1.",
+                   "Larger bone radius"},
     [ISCHIA_EM] = {"eM", "mm", 5, 60, 19, 39,
-                   "Thickness of the muscle under the ischium, unloaded."},
-    [ISCHIA_EF] = {"eF", "mm", 3, 60, 9, 35, "Thickness of the fat, unloaded."},
-    [ISCHIA_MUM] = {"muM", "kPa", 0.5, 30, 1, 8, "Shear modulus of the muscle (Ogden, alpha 5)."},
-    [ISCHIA_MUF] = {"muF", "kPa", 0.5, 30, 2.75, 8, "Shear modulus of the fat (Ogden, alpha 5)."},
+                   "Thickness of the muscle under the ischium, unloaded.", "Muscle thickness"},
+    [ISCHIA_EF] = {"eF", "mm", 3, 60, 9, 35, "Thickness of the fat under the muscle, unloaded.",
+                   "Fat thickness"},
+    [ISCHIA_MUM] = {"muM", "kPa", 0.5, 30, 1, 8, "Shear modulus of the muscle (Ogden, alpha 5).",
+                    "Muscle stiffness"},
+    [ISCHIA_MUF] = {"muF", "kPa", 0.5, 30, 2.75, 8, "Shear modulus of the fat (Ogden, alpha 5).",
+                    "Fat stiffness"},
     [ISCHIA_F] = {"F", "N", 1, 600, 192, 429,
-                  "Vertical force on this side (one ischium, the whole side)."},
+                  "Vertical force that the seat carries under this one ischium: the whole side.",
+                  "Force on this side"},
 };
 
 const struct ischia_option_info ischia_options[ISCHIA_OPTION_COUNT] = {

@@ -46,6 +46,7 @@ struct ischia_param_info {
     double studied_min; /* outside [studied_min, studied_max]: solved, with a warning      */
     double studied_max;
     const char *description; /* one plain sentence, for forms and docs                          */
+    const char *name;        /* what a form calls it, in two or three words                     */
 };
 
 struct ischia_option_info {

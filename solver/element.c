@@ -38,9 +38,22 @@ static void local_gradients(const double xi[3], double ret[3][HEX_NODES])
     }
 }
 
+const int element_edges[HEX_NODES][3] = {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7},
+                                         {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}};
+
+static double corner_volume(const double X[HEX_NODES][3], int c)
+{
+    double edge[3][3];
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++) edge[k][i] = X[element_edges[c][k]][i] - X[c][i];
+    return det3(edge);
+}
+
 void element_reference_init(struct element_reference *ret, const double X[HEX_NODES][3])
 {
     ret->volume = 0;
+    memcpy(ret->X_mm, X, sizeof ret->X_mm);
+    for (int c = 0; c < HEX_NODES; c++) ret->corner_volume[c] = corner_volume(X, c);
     for (int g = 0; g < HEX_POINTS; g++) {
         double xi[3], local[3][HEX_NODES], jacobian[3][3] = {{0}}, cofactor[3][3];
         for (int k = 0; k < 3; k++) xi[k] = corner[g][k] / sqrt(3.0);

@@ -13,8 +13,14 @@ void element_batch_set(struct element_batch *batch, int lane, const struct eleme
     }
     batch->volume[lane] = ref->volume;
     batch->mu_MPa[lane] = material->mu_MPa;
-    batch->kappa_mean_MPa[lane] = material->kappa_MPa - material->kappa_point_MPa;
+    batch->kappa_mean_MPa[lane] =
+        material->kappa_MPa - material->kappa_point_MPa - material->kappa_corner_MPa;
     batch->kappa_point_MPa[lane] = material->kappa_point_MPa;
+    batch->kappa_corner_MPa[lane] = material->kappa_corner_MPa;
+    for (int c = 0; c < HEX_NODES; c++) {
+        for (int i = 0; i < 3; i++) batch->X_mm[c][i][lane] = ref->X_mm[c][i];
+        batch->corner_volume[c][lane] = ref->corner_volume[c];
+    }
 }
 
 static bool always(void) { return true; }

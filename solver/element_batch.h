@@ -22,20 +22,26 @@ struct element_batch {
     double weight[HEX_POINTS][BATCH];
     double volume[BATCH];
     double mu_MPa[BATCH];
-    double kappa_mean_MPa[BATCH]; /* kappa - kappa_s */
+    double kappa_mean_MPa[BATCH]; /* kappa - kappa_s - kappa_c */
     double kappa_point_MPa[BATCH];
+    double kappa_corner_MPa[BATCH];
+    double X_mm[HEX_NODES][3][BATCH];
+    double corner_volume[HEX_NODES][BATCH];
 };
 
 struct element_batch_u {
     BATCH_ALIGNED double mm[HEX_NODES][3][BATCH];
 };
 
+/* The nodes at the other ends of the edges that meet in a corner, right-handed. */
+extern const int element_edges[HEX_NODES][3];
+
 /* Puts an element into a lane. */
 void element_batch_set(struct element_batch *batch, int lane, const struct element_reference *ref,
                        const struct element_material *material);
 
 struct element_batch_volume {
-    BATCH_ALIGNED double pressure_MPa[BATCH]; /* (kappa - kappa_s) (v / V - 1) */
+    BATCH_ALIGNED double pressure_MPa[BATCH]; /* kappa_mean (v / V - 1) */
     double det_F_min[BATCH];
 };
 
@@ -43,7 +49,7 @@ struct element_batch_derivatives {
     BATCH_ALIGNED double force[3][HEX_NODES][BATCH]; /* gradient, N                            */
     double stiffness[HEX_ENTRIES][BATCH]; /* Hessian, N/mm: lower triangle, row by row          */
     double volume_gradient[3][HEX_NODES][BATCH]; /* dv/du, mm2                                 */
-    double pressure_MPa[BATCH];                  /* (kappa - kappa_s) (v / V - 1)              */
+    double pressure_MPa[BATCH];                  /* kappa_mean (v / V - 1)                     */
 };
 
 /* As element_tangent, a pressure for each lane. */
@@ -54,7 +60,8 @@ struct element_batch_tangent {
 
 /*
  * The same arithmetic compiled for one width of vector registers. Energies are in N mm, HUGE_VAL in
- * the lanes where det F <= 0 at a point; what else *ret holds in those lanes is undefined.
+ * the lanes where det F <= 0 at a point or a corner; what else *ret holds in those lanes is
+ * undefined.
  */
 struct element_kernel {
     const char *name;

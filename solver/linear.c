@@ -175,5 +175,10 @@ void linear_multiply(const struct linear *l, const double *x, double *ret)
     }
 }
 
+double linear_diagonal(const struct linear *l, int i)
+{
+    return ((const double *)l->A->x)[((const int *)l->A->p)[i]];
+}
+
 double linear_flops(const struct linear *l) { return l->common.fl; }
 double linear_factor_nonzeros(const struct linear *l) { return l->common.lnz; }

@@ -47,6 +47,9 @@ ISCHIA_MUST_CHECK enum ischia_code linear_solve(struct linear *linear, int count
 /* ret = A x with the present values: all equations, nothing taken out. */
 void linear_multiply(const struct linear *linear, const double *x, double *ret);
 
+/* Diagonal entry i of the present values. */
+double linear_diagonal(const struct linear *linear, int i);
+
 /* Cost of one factorisation, from the analysis. */
 double linear_flops(const struct linear *linear);
 double linear_factor_nonzeros(const struct linear *linear);

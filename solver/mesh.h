@@ -36,9 +36,11 @@ struct mesh_divisions {
     int skin;   /* through the skin                                                 */
 };
 extern const struct mesh_divisions mesh_divisions[ISCHIA_RESOLUTION_COUNT];
-/* The coarser mesh that each resolution is solved on as well, to extrapolate to ever finer ones and
- * to know the error: the same proportions, fewer divisions. across = 0: none. */
+/* The coarser meshes that each resolution is solved on before: the same proportions, fewer
+ * divisions; across = 0: none. The companion serves to extrapolate to ever finer meshes and to know
+ * the error; each leads the next along the load path, and the starter is there for that alone. */
 extern const struct mesh_divisions mesh_companions[ISCHIA_RESOLUTION_COUNT];
+extern const struct mesh_divisions mesh_starters[ISCHIA_RESOLUTION_COUNT];
 
 struct mesh {
     int node_count;

@@ -36,6 +36,11 @@ const struct mesh_divisions mesh_companions[ISCHIA_RESOLUTION_COUNT] = {
     [ISCHIA_FINE] = {.across = 8, .around = 4, .radial = 8, .fat = 4, .skin = 1},
 };
 
+const struct mesh_divisions mesh_starters[ISCHIA_RESOLUTION_COUNT] = {
+    [ISCHIA_STANDARD] = {.across = 4, .around = 2, .radial = 4, .fat = 2, .skin = 1},
+    [ISCHIA_FINE] = {.across = 4, .around = 2, .radial = 4, .fat = 2, .skin = 1},
+};
+
 /* How far the core patch reaches over the quarter disc: along its axes, and at its corner. */
 static const double core_axis_fraction = 0.55;
 static const double core_corner_fraction = 0.46;

@@ -31,20 +31,21 @@ static const double reach_max = 256;
 static const double energy_rounding = 1e-12;
 /* The lagged limits are renewed once the rest of the residual is this share of the whole. */
 static const double relag_share = 0.1;
-/* Exact steps start below this residual; each must reduce the best by this factor, or counts as
- * idle; after some idle steps they are damped, and after more the run of them is given up. */
-static const double exact_below = 10;
+/* Each exact step must reduce the best residual by this factor, or counts as idle; after some idle
+ * steps they are damped, and after more the run of them is given up. */
 static const double exact_reduction = 0.7;
 static const int exact_damp_after = 2;
-static const double exact_damping = 0.7;
+static const double exact_damping = 0.6;
 static const int exact_idle_max = 6;
-static const int exact_rest = 2;
+static const int exact_rest = 2; /* more after each relapse */
 static const double gmres_tolerance = 1e-4;
 /* A direction that moves a node further than this, over the tissue's height, comes from a tangent
  * that is nearly singular: descend instead. */
 static const double exact_move_max = 0.1;
 /* How often a direction is found anew because it changes which nodes press on the seat. */
 enum { CONTACT_ROUNDS_MAX = 4 };
+/* What GMRES must reach with a factor of other nodes on the seat; else these are factored. */
+static const double stale_factor_max = 1e-2;
 
 /* Convexities tried in turn until the tangent is positive definite. */
 static const double convexity_ladder[] = {0, 0.3, 1};
@@ -65,9 +66,12 @@ struct newton {
     double *direction;   /* [n + 1] du, dd                                                    */
     double *scratch;     /* [n + 1]                                                           */
     double *krylov;
-    unsigned char *keep; /* [n] 0: on the seat, out of the system                             */
-    double corner;       /* d2E / dd2                                                         */
-    double schur;        /* corner - border . from_border                                     */
+    unsigned char *keep;     /* [n] 0: on the seat, out of the system                             */
+    unsigned char *factored; /* [n] keep, when it was factored                           */
+    double *good;            /* [n + 1] the last direction within bounds                          */
+    double *good_N;          /* [node] its contact forces                                         */
+    double corner;           /* d2E / dd2                                                         */
+    double schur;            /* corner - border . from_border                                     */
     double elastic_Nmm;
     double reaction_N; /* of the bone                                                       */
     double residual;   /* with the contact forces of the present iterate                    */
@@ -95,8 +99,12 @@ enum ischia_code newton_create(struct newton **ret, struct body *body, struct as
     w->scratch = calloc(n + 1, sizeof *w->scratch);
     w->krylov = malloc(gmres_work_size(assembly->n + 1) * sizeof *w->krylov);
     w->keep = calloc(n, sizeof *w->keep);
+    w->factored = calloc(n, sizeof *w->factored);
+    w->good = calloc(n + 1, sizeof *w->good);
+    w->good_N = calloc(nodes, sizeof *w->good_N);
     if (!w->force || !w->trial || !w->saved || !w->normal_N || !w->saved_N || !w->border ||
-        !w->landing || !w->from_border || !w->direction || !w->scratch || !w->krylov || !w->keep) {
+        !w->landing || !w->from_border || !w->direction || !w->scratch || !w->krylov || !w->keep ||
+        !w->factored || !w->good || !w->good_N) {
         newton_destroy(w);
         return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the Newton iteration");
     }
@@ -119,6 +127,9 @@ void newton_destroy(struct newton *w)
     free(w->scratch);
     free(w->krylov);
     free(w->keep);
+    free(w->factored);
+    free(w->good);
+    free(w->good_N);
     free(w);
 }
 
@@ -193,9 +204,8 @@ static double dot(int n, const double *a, const double *b)
 }
 
 /* x = K^-1 x, bordered under force control; x[n] belongs to d. */
-static enum ischia_code bordered_solve(void *context, double *x, struct ischia_error *err)
+static enum ischia_code bordered_solve(struct newton *w, double *x, struct ischia_error *err)
 {
-    struct newton *w = context;
     TRY(linear_solve(w->assembly->linear, 1, x, err));
     if (!w->force_controlled) {
         x[w->n] = 0;
@@ -203,6 +213,19 @@ static enum ischia_code bordered_solve(void *context, double *x, struct ischia_e
     }
     x[w->n] = (x[w->n] - dot(w->n, w->border, x)) / w->schur;
     for (int i = 0; i < w->n; i++) x[i] -= x[w->n] * w->from_border[i];
+    return ISCHIA_OK;
+}
+
+/* The same with a factor that may be of an earlier set of nodes on the seat: equations that joined
+ * since are scaled by their diagonal, those that left are zero. */
+static enum ischia_code precondition(void *context, double *x, struct ischia_error *err)
+{
+    struct newton *w = context;
+    for (int i = 0; i < w->n; i++)
+        if (w->keep[i] && !w->factored[i]) x[i] /= linear_diagonal(w->assembly->linear, i);
+    TRY(bordered_solve(w, x, err));
+    for (int i = 0; i < w->n; i++)
+        if (!w->keep[i]) x[i] = 0;
     return ISCHIA_OK;
 }
 
@@ -304,6 +327,7 @@ static enum ischia_code factor(struct newton *w, struct newton_report *report, b
     enum linear_outcome outcome;
     TRY(linear_factor(w->assembly->linear, w->keep, &outcome, err));
     report->factorisations++;
+    memcpy(w->factored, w->keep, (size_t)w->n);
     *ret_definite = outcome == LINEAR_FACTORED;
     if (!*ret_definite) return ISCHIA_OK;
     for (int i = 0; i < w->n; i++) w->from_border[i] = w->keep[i] ? w->border[i] : 0;
@@ -313,19 +337,20 @@ static enum ischia_code factor(struct newton *w, struct newton_report *report, b
     return ISCHIA_OK;
 }
 
-/* Raises the convexity of the tangent until it is positive definite. */
+/* Factors at the given rung of the convexity ladder, and raises it until the tangent is positive
+ * definite. */
 static enum ischia_code factor_definite(struct newton *w, const struct equilibrium *state,
-                                        const struct newton_control *control,
+                                        const struct newton_control *control, size_t *rung,
                                         struct newton_report *report, bool *ret_definite,
                                         struct ischia_error *err)
 {
     const size_t rungs = sizeof convexity_ladder / sizeof convexity_ladder[0];
-    *ret_definite = false;
-    for (size_t i = 0; i < rungs && !*ret_definite; i++) {
-        if (i > 0) linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[i], control);
-        w->convexified = i > 0;
+    TRY(factor(w, report, ret_definite, err));
+    while (!*ret_definite && *rung + 1 < rungs) {
+        linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[++*rung], control);
         TRY(factor(w, report, ret_definite, err));
     }
+    w->convexified = *rung > 0;
     return ISCHIA_OK;
 }
 
@@ -452,9 +477,10 @@ static enum ischia_code descent_step(struct newton *w, struct equilibrium *state
                                      struct newton_report *report, struct ischia_error *err)
 {
     bool definite;
+    size_t rung = 0;
     keep_without(w, w->normal_N);
     relag(w, state, control);
-    TRY(factor_definite(w, state, control, report, &definite, err));
+    TRY(factor_definite(w, state, control, &rung, report, &definite, err));
     if (definite) {
         load_right_hand_side(w, control, w->direction);
         TRY(bordered_solve(w, w->direction, err));
@@ -466,29 +492,71 @@ static enum ischia_code descent_step(struct newton *w, struct equilibrium *state
     return ISCHIA_OK;
 }
 
-/* *ret_found is false when the tangent is not definite, GMRES gets nowhere, or the direction is
- * out of bounds. */
+/* A direction of the exact step being found: for the nodes that w->keep leaves on the seat. */
+struct direction {
+    size_t rung;    /* of the convexity ladder                                          */
+    double reached; /* GMRES' residual over the right-hand side                         */
+    bool found;     /* definite, solved, and within bounds                              */
+    bool fresh;     /* by a factor of the very nodes on the seat, not of an earlier set */
+};
+
+/* A tangent that had to be made convex still leads: carried along by it, the pressures and contact
+ * forces come right within a few steps, and with them the tangent. */
+static enum ischia_code find_direction(struct newton *w, const struct equilibrium *state,
+                                       const struct newton_control *control,
+                                       struct newton_report *report, struct direction *d,
+                                       struct ischia_error *err)
+{
+    const struct gmres_operator op = {apply_exact, precondition, w};
+    d->found = true;
+    if (d->fresh) TRY(factor_definite(w, state, control, &d->rung, report, &d->found, err));
+    if (!d->found) return ISCHIA_OK;
+    load_exact_right_hand_side(w, control, w->direction);
+    TRY(gmres(&op, w->n + 1, gmres_tolerance, w->direction, w->krylov, &d->reached, err));
+    add_landing(w);
+    d->found = d->reached < (d->fresh ? exact_reduction : stale_factor_max) &&
+               largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm;
+    return ISCHIA_OK;
+}
+
+static void keep_good(struct newton *w)
+{
+    memcpy(w->good, w->direction, sizeof *w->good * (size_t)(w->n + 1));
+    memcpy(w->good_N, w->normal_N, node_bytes(w));
+}
+
+static void take_good(struct newton *w)
+{
+    memcpy(w->direction, w->good, sizeof *w->good * (size_t)(w->n + 1));
+    memcpy(w->normal_N, w->good_N, node_bytes(w));
+}
+
+/*
+ * Finds the direction, and finds it anew while it changes which nodes press on the seat: at first
+ * with the factor of the nodes before, which GMRES makes good; with a new factor where that fails.
+ * The last direction within bounds is taken; *ret_found is false when there is none.
+ */
 static enum ischia_code exact_direction(struct newton *w, const struct equilibrium *state,
                                         const struct newton_control *control,
                                         struct newton_report *report, bool *ret_found,
                                         struct ischia_error *err)
 {
-    const struct gmres_operator op = {apply_exact, bordered_solve, w};
+    struct direction d = {.fresh = true};
+    *ret_found = false;
     keep_without(w, w->seat->normal_N);
     memcpy(w->trial, state->u_mm, 3 * node_bytes(w));
     for (int round = 0; round < CONTACT_ROUNDS_MAX; round++) {
-        double reached;
-        TRY(factor(w, report, ret_found, err));
-        if (!*ret_found) return ISCHIA_OK;
-        load_exact_right_hand_side(w, control, w->direction);
-        TRY(gmres(&op, w->n + 1, gmres_tolerance, w->direction, w->krylov, &reached, err));
-        add_landing(w);
-        *ret_found = reached < exact_reduction &&
-                     largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm;
-        if (!*ret_found) return ISCHIA_OK;
-        find_model_normals(w);
-        if (change_contact(w, state) == 0) break;
+        TRY(find_direction(w, state, control, report, &d, err));
+        if (!d.found && d.fresh) break;
+        if (d.found) {
+            find_model_normals(w);
+            keep_good(w);
+            *ret_found = true;
+            if (change_contact(w, state) == 0) break;
+        }
+        d.fresh = !d.found;
     }
+    if (*ret_found) take_good(w);
     return ISCHIA_OK;
 }
 
@@ -497,7 +565,7 @@ static enum ischia_code exact_step(struct newton *w, struct equilibrium *state, 
                                    struct newton_report *report, bool *ret_made,
                                    struct ischia_error *err)
 {
-    double alpha;
+    double alpha = 0;
     TRY(exact_direction(w, state, control, report, ret_made, err));
     if (!*ret_made) return ISCHIA_OK;
     *ret_made = move_uninverted(w, state, alpha_max, control, &alpha);
@@ -518,6 +586,7 @@ struct exact_run {
     int idle;        /* steps since the best residual                                          */
     int rest;        /* steps of descent before the next run                                   */
     double residual; /* the best                                                               */
+    int relapses;    /* runs undone                                                            */
     double d_mm;     /* at the best; displacements and contact forces are in saved and saved_N */
 };
 
@@ -536,7 +605,8 @@ static void run_undo(struct newton *w, struct equilibrium *state, struct exact_r
     memcpy(state->u_mm, w->saved, 3 * node_bytes(w));
     memcpy(w->seat->normal_N, w->saved_N, node_bytes(w));
     state->d_mm = run->d_mm;
-    *run = (struct exact_run){.rest = exact_rest};
+    const int relapses = run->relapses + 1;
+    *run = (struct exact_run){.rest = exact_rest * relapses, .relapses = relapses};
     body_reset_pressure(w->body, (const double(*)[3])state->u_mm);
     linearise(w, (const double(*)[3])state->u_mm, 0, control);
 }
@@ -546,7 +616,7 @@ static void run_update(struct newton *w, struct equilibrium *state, struct exact
                        const struct newton_control *control)
 {
     if (!run->active) {
-        run->active = run->rest-- <= 0 && w->residual < exact_below;
+        run->active = run->rest-- <= 0;
         if (run->active) run_save(w, state, run);
     } else if (w->residual < exact_reduction * run->residual) {
         run_save(w, state, run);
@@ -587,7 +657,8 @@ enum ischia_code newton_minimise(struct newton *w, struct equilibrium *state,
             return FAIL(err, ISCHIA_E_CANCELLED, "cancelled");
         if (w->residual <= control->tolerance)
             report.reason = ISCHIA_CONVERGED;
-        else if (report.iterations++ >= control->iterations_max)
+        else if (report.iterations++ >= control->iterations_max ||
+                 (control->relapses_max > 0 && run.relapses > control->relapses_max))
             report.reason = ISCHIA_DIVERGED_ITERATIONS;
         else
             TRY(one_step(w, state, control, &run, &report, err));

@@ -29,6 +29,7 @@ struct newton_control {
     double force_N;   /* quarter model's: the target, and the scale of the residual */
     double tolerance; /* |residual| / force_N                                       */
     int iterations_max;
+    int relapses_max; /* runs of exact steps that may be undone before giving up; 0: any number */
 };
 
 struct newton_report {

@@ -2,6 +2,7 @@
 #ifndef ISCHIA_SOLVER_PATH_H
 #define ISCHIA_SOLVER_PATH_H
 
+#include "solver/guide.h"
 #include "solver/newton.h"
 
 /*
@@ -13,6 +14,7 @@ struct path_point {
     double d_mm;
     double force_N;        /* quarter model */
     double stiffness_N_mm; /* dF/dd         */
+    double work_Nmm;       /* of the seat   */
 };
 
 struct path_report {
@@ -30,7 +32,7 @@ struct path_report {
 struct path_observer {
     bool (*on_iteration)(void *context, int load_step, int newton_iteration, double force_N);
     enum ischia_code (*on_step)(void *context, const struct equilibrium *state,
-                                struct ischia_error *err);
+                                const struct path_point *point, struct ischia_error *err);
     void *context;
 };
 
@@ -38,7 +40,7 @@ struct path_observer {
  * in the last converged state. */
 ISCHIA_MUST_CHECK enum ischia_code
 path_follow(struct body *body, struct assembly *assembly, struct seat *seat, double force_N,
-            const struct path_observer *observer, struct equilibrium *state,
-            struct path_report *ret_report, struct ischia_error *err);
+            const struct guide *guide, const struct path_observer *observer,
+            struct equilibrium *state, struct path_report *ret_report, struct ischia_error *err);
 
 #endif

@@ -8,16 +8,19 @@
 
 #include "solver/axis.h"
 #include "solver/clusters.h"
+#include "solver/curve.h"
 #include "solver/path.h"
 #include "solver/seat_pressure.h"
 #include "solver/strain.h"
 #include "solver/units.h"
 
 /*
- * Share of the volumetric stiffness that acts point by point, over mu: keeps det F from scattering
- * inside the elements at the bonded rim. Its effect on eps_max: docs/VERIFICATION.md.
+ * Over mu: the share of the volumetric stiffness that acts point by point, which keeps det F from
+ * scattering inside the elements at the bonded rim, and what resists the collapse of the elements'
+ * corners (element.h). Their effect on eps_max: docs/VERIFICATION.md.
  */
-static const double kappa_point_over_mu = 5;
+static const double kappa_point_over_mu = 0.3;
+static const double kappa_corner_over_mu = 0.1;
 
 /* What a result must pass to be called converged. */
 static const double energy_residual_max = 5e-3;
@@ -28,7 +31,13 @@ static const double error_allowance = 0.005;
 /* Of the extrapolation's own correction, how much may be wrong. */
 static const double correction_doubt = 0.25;
 
-enum { LEVEL_COMPANION, LEVEL_MAIN, LEVEL_COUNT };
+/* The starter leads from every third of its steps to the next: a finer mesh's cost far more. */
+static const int stride_of_starter = 3;
+
+/* Coarsest first; each leads the next along the load path. */
+enum { LEVEL_STARTER, LEVEL_COMPANION, LEVEL_MAIN, LEVEL_COUNT };
+static const struct mesh_divisions *const level_divisions[LEVEL_COUNT] = {
+    mesh_starters, mesh_companions, mesh_divisions};
 
 struct ischia_solver {
     struct assembly assembly[ISCHIA_RESOLUTION_COUNT][LEVEL_COUNT]; /* made when first needed */
@@ -69,8 +78,8 @@ struct level {
     struct equilibrium state;
     struct assembly *assembly; /* the solver's */
     struct path_report report;
-    struct ischia_load_point load_curve[ISCHIA_LOAD_POINTS_MAX];
-    int load_curve_count;
+    struct guide guide; /* for the next level */
+    struct load_curve curve;
 };
 
 struct solve {
@@ -85,6 +94,7 @@ struct solve {
 static void solve_finish(struct solve *s)
 {
     for (int l = 0; l < LEVEL_COUNT; l++) {
+        guide_finish(&s->level[l].guide);
         free(s->level[l].state.u_mm);
         seat_finish(&s->level[l].seat);
         body_finish(&s->level[l].body);
@@ -101,7 +111,8 @@ static void set_materials(const struct ischia_case *c, struct element_material r
         const double mu = MPa_from_kPa(mu_kPa[t]);
         ret[t] = (struct element_material){.mu_MPa = mu,
                                            .kappa_MPa = mu * c->option[ISCHIA_BULK_RATIO],
-                                           .kappa_point_MPa = mu * kappa_point_over_mu};
+                                           .kappa_point_MPa = mu * kappa_point_over_mu,
+                                           .kappa_corner_MPa = mu * kappa_corner_over_mu};
     }
 }
 
@@ -111,8 +122,7 @@ static enum ischia_code level_init(struct solve *s, int l, struct ischia_solver 
     const int r = (int)s->c->resolution;
     struct level *level = &s->level[l];
     struct element_material material[TISSUE_COUNT];
-    TRY(mesh_local_init(&level->mesh, s->c,
-                        l == LEVEL_MAIN ? &mesh_divisions[r] : &mesh_companions[r], err));
+    TRY(mesh_local_init(&level->mesh, s->c, &level_divisions[l][r], err));
     if (!solver->has_assembly[r][l]) TRY(assembly_init(&solver->assembly[r][l], &level->mesh, err));
     solver->has_assembly[r][l] = true;
     level->assembly = &solver->assembly[r][l];
@@ -125,28 +135,33 @@ static enum ischia_code level_init(struct solve *s, int l, struct ischia_solver 
     return ISCHIA_OK;
 }
 
-/* Share of the work that the companion mesh takes. */
-static const double companion_share = 0.3;
+/* Share of the work that is done when a level begins, and what a user may read meanwhile. */
+static const struct {
+    double start;
+    const char *message;
+} level_progress[LEVEL_COUNT + 1] = {
+    [LEVEL_STARTER] = {0, "pressing a coarse mesh on the seat"},
+    [LEVEL_COMPANION] = {0.1, "pressing a finer mesh on the seat"},
+    [LEVEL_MAIN] = {0.4, "pressing the tissue on the seat"},
+    [LEVEL_COUNT] = {0.99, NULL},
+};
 
 static bool report_iteration(void *context, int load_step, int newton_iteration, double force_N)
 {
     struct solve *s = context;
     const double F_N = side_force_N(force_N);
-    const bool companion = s->current == LEVEL_COMPANION;
     /* The force is what a user waits for; early steps carry little of it, hence the root. */
     const double share = sqrt(fmax(0, fmin(1, F_N / s->c->param[ISCHIA_F])));
-    const double start =
-        companion || s->level[LEVEL_COMPANION].mesh.node_count == 0 ? 0 : companion_share;
+    const bool alone = s->level[LEVEL_COMPANION].mesh.node_count == 0 && s->current == LEVEL_MAIN;
+    const double start = alone ? 0 : level_progress[s->current].start;
+    const double end = level_progress[s->current + 1].start;
     if (s->observer == NULL || s->observer->on_progress == NULL) return true;
-    s->fraction =
-        fmax(s->fraction, companion ? companion_share * share : start + (0.99 - start) * share);
+    s->fraction = fmax(s->fraction, start + (end - start) * share);
     const struct ischia_progress progress = {.fraction = s->fraction,
                                              .load_step = load_step,
                                              .newton_iteration = newton_iteration,
                                              .F_N = F_N,
-                                             .message =
-                                                 companion ? "pressing the coarser mesh on the seat"
-                                                           : "pressing the tissue on the seat"};
+                                             .message = level_progress[s->current].message};
     return s->observer->on_progress(s->observer->context, &progress);
 }
 
@@ -157,60 +172,55 @@ static double eps_max_of(const struct axis_strain *axis)
 
 /* One point of the load curve. */
 static enum ischia_code record_step(void *context, const struct equilibrium *state,
-                                    struct ischia_error *err)
+                                    const struct path_point *point, struct ischia_error *err)
 {
     struct solve *s = context;
     struct level *level = &s->level[s->current];
     struct strain_field field;
-    if (level->load_curve_count == ISCHIA_LOAD_POINTS_MAX) return ISCHIA_OK;
     const struct axis_strain axis = axis_strain_of(&level->mesh, (const double(*)[3])state->u_mm);
     TRY(strain_field_init(&field, &level->mesh, &state->u_mm[0][0], err));
     const struct strain_measures most = strain_muscle_maxima(&level->mesh, &field);
     strain_field_finish(&field);
-    level->load_curve[level->load_curve_count++] =
-        (struct ischia_load_point){.F_N = side_force_N(state->force_N),
-                                   .displacement_mm = state->d_mm,
-                                   .eps_max = eps_max_of(&axis),
-                                   .E_shear_max = most.green_lagrange_shear,
-                                   .E_comp_max = most.green_lagrange_compression};
-    return ISCHIA_OK;
-}
-
-/* eps_max of a level's load curve at a force, linear between its points and from rest. */
-static double eps_max_at(const struct level *level, double F_N)
-{
-    struct ischia_load_point before = {0};
-    for (int i = 0; i < level->load_curve_count; i++) {
-        const struct ischia_load_point *p = &level->load_curve[i];
-        if (F_N <= p->F_N && p->F_N > before.F_N)
-            return before.eps_max +
-                   (p->eps_max - before.eps_max) * (F_N - before.F_N) / (p->F_N - before.F_N);
-        before = *p;
-    }
-    return before.eps_max;
+    const struct ischia_load_point load = {.F_N = side_force_N(state->force_N),
+                                           .displacement_mm = state->d_mm,
+                                           .eps_max = eps_max_of(&axis),
+                                           .E_shear_max = most.green_lagrange_shear,
+                                           .E_comp_max = most.green_lagrange_compression};
+    load_curve_add(&level->curve, &load);
+    if (s->current == LEVEL_MAIN) return ISCHIA_OK;
+    const struct guide_point numbers = {.d_mm = point->d_mm,
+                                        .force_N = point->force_N,
+                                        .stiffness_N_mm = point->stiffness_N_mm,
+                                        .work_Nmm = point->work_Nmm};
+    return guide_record(&level->guide, &numbers, &level->body, &level->seat,
+                        (const double(*)[3])state->u_mm, err);
 }
 
 /*
  * Takes the main level's load curve as the result's, eps_max extrapolated to ever finer meshes: its
  * error falls with the square of the mesh size (docs/VERIFICATION.md), so with r the ratio of the
- * two sizes, eps = eps_main + (eps_main - eps_companion) / (r^2 - 1) (Richardson). Returns the
- * correction at the end of the path; 0 where there is no companion.
+ * two sizes, eps = eps_main + (eps_main - eps_companion) / (r^2 - 1) (Richardson). Between the few
+ * steps of these levels the curve follows the starter's. Returns the correction at the end of the
+ * path; 0 where there is no companion.
  */
 static double extrapolate(struct solve *s)
 {
-    const struct level *companion = &s->level[LEVEL_COMPANION], *level = &s->level[LEVEL_MAIN];
+    const struct level *starter = &s->level[LEVEL_STARTER];
+    struct level *companion = &s->level[LEVEL_COMPANION], *main = &s->level[LEVEL_MAIN];
     const double ratio =
-        (double)level->mesh.divisions.across / fmax(1, companion->mesh.divisions.across);
-    const bool possible = companion->report.reason > 0;
+        (double)main->mesh.divisions.across / fmax(1, companion->mesh.divisions.across);
     double correction = 0;
-    s->result.load_curve_count = level->load_curve_count;
-    for (int i = 0; i < level->load_curve_count; i++) {
+    load_curve_refine(&companion->curve, &starter->curve);
+    load_curve_refine(&main->curve, &starter->curve);
+    for (int i = 0; i < main->curve.count; i++) {
         struct ischia_load_point *p = &s->result.load_curve[i];
-        *p = level->load_curve[i];
-        if (possible)
-            correction = (p->eps_max - eps_max_at(companion, p->F_N)) / (ratio * ratio - 1);
+        *p = main->curve.point[i];
+        if (companion->report.reason > 0)
+            correction = (p->eps_max - load_curve_at(&companion->curve, p->F_N).eps_max) /
+                         (ratio * ratio - 1);
         p->eps_max += correction;
     }
+    s->result.load_curve_count = main->curve.count;
     return correction;
 }
 
@@ -229,6 +239,27 @@ static double crossing_N(const struct ischia_result *r, size_t offset, double th
     return (double)NAN;
 }
 
+/*
+ * How far eps_max may be off. The values read beside the axis and recovered on it converge to the
+ * same from two sides, so that what is left between their extrapolations is error, and so is a part
+ * of the extrapolation's own correction. Without a second level the whole bracket of the two stands
+ * for the error of its middle.
+ */
+static double eps_max_error(const struct solve *s, const struct axis_strain *axis,
+                            double correction)
+{
+    const struct level *companion = &s->level[LEVEL_COMPANION], *main = &s->level[LEVEL_MAIN];
+    const double allowance = error_allowance * s->result.strain.eps_max;
+    const double bracket = axis->recovered - axis->raw;
+    if (!(companion->report.reason > 0)) return fabs(bracket) + allowance;
+    const struct axis_strain coarser =
+        axis_strain_of(&companion->mesh, (const double(*)[3])companion->state.u_mm);
+    const double ratio = (double)main->mesh.divisions.across / companion->mesh.divisions.across;
+    const double left =
+        bracket + (bracket - (coarser.recovered - coarser.raw)) / (ratio * ratio - 1);
+    return correction_doubt * fabs(correction) + fabs(left) + allowance;
+}
+
 static void measure_axis(struct solve *s)
 {
     struct ischia_result *r = &s->result;
@@ -236,14 +267,9 @@ static void measure_axis(struct solve *s)
     const struct axis_strain axis =
         axis_strain_of(&level->mesh, (const double(*)[3])level->state.u_mm);
     const double correction = extrapolate(s);
-    const double bracket = fabs(axis.recovered - axis.raw);
     r->strain.eps_max = eps_max_of(&axis) + correction;
     r->strain.eps_max_depth_mm = axis.depth_mm;
-    /* Without a second level the whole bracket stands for the error of its middle. */
-    r->numerics.eps_max_error =
-        (s->level[LEVEL_COMPANION].report.reason > 0 ? correction_doubt * fabs(correction)
-                                                     : bracket) +
-        error_allowance * r->strain.eps_max;
+    r->numerics.eps_max_error = eps_max_error(s, &axis, correction);
 }
 
 static enum ischia_code measure(struct solve *s, struct ischia_error *err)
@@ -269,6 +295,11 @@ static enum ischia_code measure(struct solve *s, struct ischia_error *err)
     return seat_pressure(&level->mesh, &seat, &r->seat, err);
 }
 
+static bool is_sound(const struct path_report *report)
+{
+    return report->reason > 0 && fabs(report->energy_residual) <= energy_residual_max;
+}
+
 /* The checks that a converged load path must still pass. */
 static void judge(struct solve *s)
 {
@@ -276,11 +307,11 @@ static void judge(struct solve *s)
     const struct level *level = &s->level[LEVEL_MAIN];
     n->det_F_min = body_det_F_min(&level->body, (const double(*)[3])level->state.u_mm);
     if (n->reason < 0) return;
-    if (!(n->det_F_min > 0) || !(fabs(n->energy_residual) <= energy_residual_max)) {
+    if (!(n->det_F_min > 0) || !is_sound(&level->report)) {
         n->reason = ISCHIA_DIVERGED_CHECKS;
         (void)snprintf(n->detail, sizeof n->detail,
-                       "the load path ended, but det F is %.3g at the least (> 0 wanted) and the "
-                       "energy balance is off by %.2g (at most %g)",
+                       "det F is %.3g at the least (> 0 wanted), the energy balance is off by %.2g "
+                       "(at most %g)",
                        n->det_F_min, n->energy_residual, energy_residual_max);
     }
 }
@@ -315,24 +346,49 @@ static enum ischia_code keep_field(const struct level *level, struct ischia_fiel
     return ISCHIA_OK;
 }
 
+/* At rest again, as level_init leaves it. */
+static enum ischia_code level_reset(struct solve *s, struct level *level, struct ischia_error *err)
+{
+    seat_finish(&level->seat);
+    guide_finish(&level->guide);
+    TRY(seat_init(&level->seat, &level->mesh, s->c->option[ISCHIA_FRICTION], err));
+    memset(level->state.u_mm, 0, sizeof *level->state.u_mm * (size_t)level->mesh.node_count);
+    level->state = (struct equilibrium){.u_mm = level->state.u_mm};
+    level->curve.count = 0;
+    return ISCHIA_OK;
+}
+
+/* Follows the path, led by the level before; and once more without a guide where that ends short of
+ * the force or loses energy, as it does when a long step lands on another branch. */
 static enum ischia_code solve_level(struct solve *s, int l, struct ischia_solver *solver,
                                     struct ischia_error *err)
 {
     const struct path_observer observer = {report_iteration, record_step, s};
+    const double force_N = quarter_force_N(s->c->param[ISCHIA_F]);
     struct level *level = &s->level[l];
+    if (level_divisions[l][s->c->resolution].across == 0) return ISCHIA_OK;
     s->current = l;
     TRY(level_init(s, l, solver, err));
-    return path_follow(&level->body, level->assembly, &level->seat,
-                       quarter_force_N(s->c->param[ISCHIA_F]), &observer, &level->state,
-                       &level->report, err);
+    for (int attempt = 0; attempt < (l > 0 ? 2 : 1); attempt++) {
+        const struct guide *guide = attempt == 0 && l > 0 ? &s->level[l - 1].guide : NULL;
+        struct path_report report;
+        if (attempt > 0) TRY(level_reset(s, level, err));
+        TRY(path_follow(&level->body, level->assembly, &level->seat, force_N, guide, &observer,
+                        &level->state, &report, err));
+        report.newton_iterations += level->report.newton_iterations;
+        report.factorisations += level->report.factorisations;
+        level->report = report;
+        if (is_sound(&report)) break;
+    }
+    level->guide.complete = level->report.reason > 0;
+    level->guide.stride = l == 0 ? stride_of_starter : 1;
+    return ISCHIA_OK;
 }
 
 static enum ischia_code solve_run(struct solve *s, struct ischia_solver *solver,
                                   struct ischia_field *ret_field, struct ischia_error *err)
 {
-    if (mesh_companions[s->c->resolution].across > 0)
-        TRY(solve_level(s, LEVEL_COMPANION, solver, err));
-    TRY(solve_level(s, LEVEL_MAIN, solver, err));
+    for (int l = 0; l < LEVEL_COUNT; l++) TRY(solve_level(s, l, solver, err));
     take_reports(s);
     TRY(measure(s, err));
     judge(s);

@@ -14,6 +14,7 @@
 #include "server/cli/field_blob.h"
 #include "server/cli/options.h"
 #include "server/cli/run.h"
+#include "server/cli/version.h"
 #include "server/cli/worker_sandbox.h"
 #include "server/frame.h"
 #include "server/message.h"
@@ -70,11 +71,11 @@ static enum ischia_code put(struct worker *worker, const struct message *message
 
 static enum ischia_code say_hello(struct worker *worker, struct ischia_error *err)
 {
-    const struct message hello = {.kind = MESSAGE_HELLO,
-                                  .protocol = FRAME_PROTOCOL_VERSION,
-                                  .model_version = ISCHIA_MODEL_VERSION,
-                                  .program = ISCHIA_VERSION,
-                                  .model = ISCHIA_MODEL_NAME};
+    struct message hello = {.kind = MESSAGE_HELLO,
+                            .protocol = FRAME_PROTOCOL_VERSION,
+                            .model_version = ISCHIA_MODEL_VERSION,
+                            .model = ISCHIA_MODEL_NAME};
+    version_of_worker(hello.program, sizeof hello.program);
     TRY(put(worker, &hello, err));
     return send_all(worker, err);
 }

@@ -137,7 +137,7 @@ void handle_get(struct call *call, struct http_response *ret)
         if (call->deadline_ms > 0) (void)call_subscribe(call);
     }
     if (!peek(call, &row, ret)) return;
-    if (submit_still_waiting(call, &row))
+    if (call_still_waits(call, queue_is_final(row.state)))
         call_wait(call, ret);
     else
         send_row(call, &row, 200, ret);
@@ -207,7 +207,7 @@ static void finish_submit(struct call *call, struct http_response *ret)
 {
     struct store_assessment row;
     if (!submit_take_accepted(call, ret) || !peek(call, &row, ret)) return;
-    if (submit_still_waiting(call, &row))
+    if (call_still_waits(call, queue_is_final(row.state)))
         call_wait(call, ret);
     else
         send_accepted(call, &row, ret);
@@ -232,13 +232,13 @@ void handle_cancel(struct call *call, struct http_response *ret)
         reply_failure(call->request, ret, &err);
     else if (answer == STORE_NOT_FOUND)
         reply_no_assessment(call, ret);
-    else if (answer == STORE_CONFLICT && was != QUEUE_CANCELLED)
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This assessment has ended: %s.",
-                      queue_state_names[was]);
-    else if (is_form(call)) { /* the plain report's button */
+    else if (is_form(call)) { /* the plain report's button: the report says how it ended */
         ret->status = 303;
         http_header(ret, "Location", "/v1/assessments/%s/report", call->id_text);
-    } else
+    } else if (answer == STORE_CONFLICT && was != QUEUE_CANCELLED)
+        reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This assessment has ended: %s.",
+                      queue_state_names[was]);
+    else
         read_and_render(call, 0, ret); /* cancelling twice is no fault */
 }
 

@@ -42,7 +42,7 @@ static void put_problem(struct text_out *out, const struct problem_info *info)
 void handle_docs(struct call *call, struct http_response *ret)
 {
     struct text_out out;
-    page_begin(&out, "Ischia: the service", 0);
+    page_begin(&out, "Ischia: the service");
     page_put(&out, "<h1>The Ischia service</h1>\n<p>The whole contract, for programs: "
                    "<a href=\"/openapi.json\">openapi.json</a> (OpenAPI 3.1).</p>\n"
                    "<h2>Routes</h2>\n<table>\n<thead><tr><th>route</th><th>token's scope</th>"

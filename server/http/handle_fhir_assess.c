@@ -148,7 +148,7 @@ static void finish(struct call *call, struct http_response *ret)
 {
     struct store_assessment row;
     if (!submit_take_accepted(call, ret) || !fhir_get_row(call, &row, ret)) return;
-    if (submit_still_waiting(call, &row)) {
+    if (call_still_waits(call, queue_is_final(row.state))) {
         call_wait(call, ret);
     } else if (queue_is_final(row.state) && !wants_async(call)) {
         send_ended(call, &row, ret);

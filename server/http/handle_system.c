@@ -130,6 +130,8 @@ void handle_metrics(struct call *call, struct http_response *ret)
 void handle_version(struct call *call, struct http_response *ret)
 {
     struct json_out out;
+    struct pool_stats pool;
+    pool_stats(queue_pool(call->service->queue), &pool);
     json_out_init(&out, 2);
     json_open_object(&out, NULL);
     json_put_string(&out, "program", "ischiad");
@@ -142,6 +144,7 @@ void handle_version(struct call *call, struct http_response *ret)
     for (const struct version *v = versions(); v->name != NULL; v++)
         json_put_string(&out, v->name, v->text());
     json_close_object(&out);
+    json_put_string(&out, "worker", pool.program[0] == '\0' ? NULL : pool.program);
     json_put_integer(&out, "schema", store_schema_version());
     json_close_object(&out);
     http_header_static(ret, "Cache-Control", "no-cache");

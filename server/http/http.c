@@ -17,6 +17,7 @@
 
 #include "server/http/gzip.h"
 #include "server/http/listen.h"
+#include "server/http/tls.h"
 
 /*
  * A request's way through the library: on_uri (its first line was read; the exchange is made),
@@ -291,7 +292,7 @@ static void open_connection(struct http_server *server, struct MHD_Connection *m
     *ret = connection; /* NULL: its requests are refused in on_uri */
     if (connection == NULL) return;
     connection->fd = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
-    connection->tls = server->options.tls_certificate != NULL;
+    connection->tls = server->options.tls;
     atomic_store(&connection->phase, PHASE_IDLE);
     atomic_store(&connection->deadline_ms, after_s(server->options.request_timeout_s));
     (void)pthread_mutex_lock(&server->connections_lock);
@@ -658,16 +659,14 @@ __attribute__((format(printf, 2, 0))) static void on_log(void *context, const ch
 static enum ischia_code start_daemon(struct http_server *server, struct ischia_error *err)
 {
     const struct http_options *o = &server->options;
-    const bool tls = o->tls_certificate != NULL;
     unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_SUSPEND_RESUME | MHD_USE_ERROR_LOG;
     struct MHD_OptionItem tls_options[] = {
-        {MHD_OPTION_HTTPS_MEM_CERT, 0, (void *)(uintptr_t)o->tls_certificate},
-        {MHD_OPTION_HTTPS_MEM_KEY, 0, (void *)(uintptr_t)o->tls_key},
+        {MHD_OPTION_HTTPS_CERT_CALLBACK2, 0, tls_callback()},
         {MHD_OPTION_HTTPS_PRIORITIES, 0,
          (void *)(uintptr_t) "SECURE128:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2"},
         {MHD_OPTION_END, 0, NULL},
     };
-    if (tls)
+    if (o->tls)
         flags |= MHD_USE_TLS;
     else
         tls_options[0].option = MHD_OPTION_END;
@@ -681,8 +680,7 @@ static enum ischia_code start_daemon(struct http_server *server, struct ischia_e
         (unsigned)o->connections_per_address, MHD_OPTION_CONNECTION_TIMEOUT,
         (unsigned)o->idle_timeout_s, MHD_OPTION_THREAD_STACK_SIZE, (size_t)(256 * 1024),
         MHD_OPTION_ARRAY, tls_options, MHD_OPTION_END);
-    CHECK(server->daemon != NULL, err, ISCHIA_E_IO, "the HTTP library did not start%s",
-          tls ? "; are tls_certificate and tls_key PEM files that belong together?" : "");
+    CHECK(server->daemon != NULL, err, ISCHIA_E_IO, "the HTTP library did not start");
     return ISCHIA_OK;
 }
 
@@ -712,11 +710,12 @@ enum ischia_code http_start(struct http_server **ret, const struct http_options 
     enum ischia_code code = start_ticker(server, err);
     if (code == ISCHIA_OK)
         code = listen_open(options->listen, &server->listen_fd, server->address, err);
+    *ret = server; /* the first request may come before start_daemon returns */
     if (code == ISCHIA_OK) code = start_daemon(server, err);
-    if (code == ISCHIA_OK)
-        *ret = server;
-    else
+    if (code != ISCHIA_OK) {
+        *ret = NULL;
         http_destroy(server);
+    }
     return code;
 }
 

@@ -134,13 +134,14 @@ struct http_options {
     int threads;
     int connections, connections_per_address;
     int idle_timeout_s, request_timeout_s;
-    const char *tls_certificate, *tls_key; /* PEM text, NULL: no TLS                       */
+    bool tls; /* with the certificate of tls_set                                             */
 };
 
 struct http_server;
 
-/* Listens and answers until http_stop. ISCHIA_E_INPUT: the address or the certificate is not
- * usable; ISCHIA_E_IO: it cannot be listened on. *ret is the caller's to stop. */
+/* Listens and answers until http_stop. ISCHIA_E_INPUT: the address is not usable; ISCHIA_E_IO: it
+ * cannot be listened on. *ret is the caller's to stop; it is set before the first callback, and
+ * NULL after a failure. */
 ISCHIA_MUST_CHECK enum ischia_code http_start(struct http_server **ret,
                                               const struct http_options *options,
                                               const struct http_app *app, struct ischia_error *err);

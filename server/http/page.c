@@ -40,17 +40,12 @@ void page_format(struct text_out *out, const char *format, ...)
     page_escape(out, text);
 }
 
-void page_begin(struct text_out *out, const char *title, int refresh_s)
+void page_begin(struct text_out *out, const char *title)
 {
     text_out_init(out);
     page_put(out, "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-                  "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
-    if (refresh_s > 0) {
-        page_put(out, "<meta http-equiv=\"refresh\" content=\"");
-        page_format(out, "%d", refresh_s);
-        page_put(out, "\">\n");
-    }
-    page_put(out, "<title>");
+                  "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+                  "<title>");
     page_escape(out, title);
     page_put(out, "</title>\n<link rel=\"stylesheet\" href=\"/assets/plain.css\">\n</head>\n"
                   "<body>\n<main>\n");
@@ -71,6 +66,13 @@ static void sent_value(const struct form *form, const char *key, char *ret, size
 {
     ret[0] = '\0';
     if (form->sent != NULL) (void)query_find(form->sent, key, ret, size);
+}
+
+static bool has_fault(const struct form *form, const char *key)
+{
+    char pointer[80];
+    (void)snprintf(pointer, sizeof pointer, "/%s", key);
+    return form->faults != NULL && doc_faults_has(form->faults, pointer);
 }
 
 static void put_faults(const struct form *form, const char *key)
@@ -123,14 +125,20 @@ static void put_value(const struct form *form, const char *key)
     sent_value(form, key, value, sizeof value);
     page_put(form->out, "\" value=\"");
     page_escape(form->out, value);
-    page_put(form->out, "\"></p>\n");
+    page_put(form->out, "\"");
+    if (has_fault(form, key)) {
+        page_put(form->out, " aria-invalid=\"true\" aria-describedby=\"");
+        page_escape(form->out, key);
+        page_put(form->out, "-fault\"");
+    }
+    page_put(form->out, "></p>\n");
     put_faults(form, key);
 }
 
 static void put_parameter(const struct form *form, const struct ischia_param_info *info)
 {
     char label[128];
-    (void)snprintf(label, sizeof label, "%s (%s, %g to %g)", info->key, info->unit,
+    (void)snprintf(label, sizeof label, "%s %s (%s, %g to %g)", info->name, info->key, info->unit,
                    info->accepted_min, info->accepted_max);
     put_label(form, info->key, label);
     page_put(form->out, "\" inputmode=\"decimal\" required autocomplete=\"off\" title=\"");
@@ -161,8 +169,9 @@ static void put_sides(const struct form *form)
 static void put_form(const struct form *form)
 {
     page_put(form->out,
-             "<h1>Tissue under one ischium</h1>\n<p>Seven measured numbers of one side. A decimal "
-             "point, no comma.</p>\n<form method=\"post\" action=\"/v1/assessments\">\n");
+             "<h1>Tissue under one ischium</h1>\n<p>Seven measured numbers of one side, each "
+             "with a decimal point or a decimal comma.</p>\n<form method=\"post\" "
+             "action=\"/v1/assessments\">\n");
     put_other_faults(form);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) put_parameter(form, &ischia_params[i]);
     put_sides(form);
@@ -182,7 +191,7 @@ void page_form(struct call *call, const char *body, size_t size, const struct do
     struct text_out out;
     char *sent = body == NULL ? NULL : strndup(body, size);
     const struct form form = {&out, sent, faults};
-    page_begin(&out, "Ischia: assess one side", 0);
+    page_begin(&out, "Ischia: assess one side");
     put_form(&form);
     page_end(&out);
     free(sent);

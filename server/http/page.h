@@ -19,8 +19,8 @@ void page_escape(struct text_out *out, const char *text);
 /* The same, printf-style; cut after 1 KiB. */
 __attribute__((format(printf, 2, 3))) void page_format(struct text_out *out, const char *format,
                                                        ...);
-/* Starts a document in an empty out. It loads itself again after refresh_s seconds; 0: never. */
-void page_begin(struct text_out *out, const char *title, int refresh_s);
+/* Starts a document in an empty out. */
+void page_begin(struct text_out *out, const char *title);
 /* Closes what page_begin opened. */
 void page_end(struct text_out *out);
 

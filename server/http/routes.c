@@ -76,7 +76,7 @@ const struct route routes[] = {
     {HTTP_GET, ASSESSMENT "/section.svg", "GET " ASSESSMENT "/section.svg", handle_section,
      AUTH_READ, 0, NULL, TYPES("image/svg+xml"), NULL, "assessment.read", false},
     {HTTP_GET, ASSESSMENT "/report", "GET " ASSESSMENT "/report", handle_report, AUTH_READ, 0, NULL,
-     TYPES("text/html"), NULL, "assessment.read", false},
+     TYPES("text/html"), TYPES("wait"), "assessment.read", false},
     {HTTP_GET, "/v1/parameters", "GET /v1/parameters", handle_parameters, 0, 0, NULL, TYPES(JSON),
      NULL, NULL, false},
     {HTTP_GET, "/v1/changes", "GET /v1/changes", handle_changes, AUTH_READ, 0, NULL, TYPES(JSON),
@@ -239,6 +239,12 @@ bool call_subscribe(struct call *call)
     if (call->subscription != NULL) return true;
     return events_subscribe(call->service->events, &call->id, wake_call, call->request->exchange,
                             &call->subscription, &err) == ISCHIA_OK;
+}
+
+bool call_still_waits(const struct call *call, bool ended)
+{
+    return !ended && http_now_ms() < call->deadline_ms && call->subscription != NULL &&
+           !http_is_stopping(call->service->http);
 }
 
 void call_wait(struct call *call, struct http_response *response)

@@ -82,5 +82,7 @@ void deferred_drop(struct deferred *deferred);
 void call_wait(struct call *call, struct http_response *response);
 /* Subscribes the call to its assessment's events, once. */
 bool call_subscribe(struct call *call);
+/* True while there is a reason to wait for the end of the assessment. ended: it has. */
+bool call_still_waits(const struct call *call, bool ended);
 
 #endif

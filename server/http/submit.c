@@ -19,12 +19,6 @@ int64_t submit_wait_deadline(const struct call *call)
     return seconds < 0 ? 0 : call->request->begun_ms + (int64_t)seconds * 1000;
 }
 
-bool submit_still_waiting(struct call *call, const struct store_assessment *row)
-{
-    return !queue_is_final(row->state) && http_now_ms() < call->deadline_ms &&
-           !http_is_stopping(call->service->http) && call->subscription != NULL;
-}
-
 /* Printable ASCII, as RFC 9110 would have any header be; "" is none. */
 bool submit_read_key(struct call *call, const char **ret_key, struct http_response *ret)
 {

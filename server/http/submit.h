@@ -25,7 +25,4 @@ bool submit_take_accepted(struct call *call, struct http_response *ret);
 /* Seconds of Prefer: wait as a deadline for call_wait; 0: it was not asked for. */
 int64_t submit_wait_deadline(const struct call *call);
 
-/* True while there is a reason to wait for the end of the assessment. */
-bool submit_still_waiting(struct call *call, const struct store_assessment *row);
-
 #endif

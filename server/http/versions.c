@@ -8,7 +8,7 @@
 
 #include "api/json.h"
 #include "server/http/http.h"
-#include "server/jose.h"
+#include "server/http/tls.h"
 #include "server/outbound/web.h"
 #include "server/store/store.h"
 
@@ -17,9 +17,9 @@ const struct version *versions(void)
     static const struct version rows[] = {
         {"store", store_engine},
         {"libmicrohttpd", http_library_version},
+        {"GnuTLS", tls_library_version},
         {"libsodium", sodium_version_string},
         {"zlib", zlibVersion},
-        {"GnuTLS", jose_library_version},
         {"libcurl", web_library_version},
         {"cJSON", json_library_version},
         {"glibc", gnu_get_libc_version},

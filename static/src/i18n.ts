@@ -8,6 +8,8 @@ import { fr } from './lang/fr.js';
 
 export type Key = keyof typeof en;
 export type Strings = Record<Key, string>;
+/* A number's name and help are the daemon's own in English and translated here by its key. */
+export type Translation = Strings & { [key: `param.${string}`]: string };
 export type Language = 'en' | 'fr' | 'de';
 
 const languages: Record<Language, Strings> = { en, fr, de };

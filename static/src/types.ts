@@ -13,6 +13,7 @@ export interface Range {
 
 export interface ParameterInfo {
   key: string;
+  name: string;
   unit: string;
   description: string;
   accepted: Range;
@@ -82,6 +83,8 @@ export interface Problem {
   status?: number;
   detail?: string;
   errors?: FieldError[];
+  reason?: string; /* why a load path ended */
+  last_converged_fraction?: number; /* of the force */
 }
 
 export interface Assessment {

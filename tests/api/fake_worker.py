@@ -3,8 +3,10 @@
 """A worker that solves nothing: it speaks the worker's protocol (docs/WORKER.md) so that tests of
 the service need no mechanics and can ask for what a solver seldom does.
 
-The force says what happens: 599 N never ends, 598 N ends in a problem, 597 N kills the worker,
-596 N takes a second; any other gives a result, always the same but for what echoes the inputs.
+The force, to the whole number below, says what happens: 599 N never ends, 598 N ends in a problem,
+597 N kills the worker, 596 N takes a second, 595 N until the file /tmp/ischia-gate-PID is there (PID
+being the daemon's), 594 N takes memory until there is none; any other gives a result, always the
+same but for what echoes the inputs. newton_iterations is the force in mN: whose result it is.
 """
 import json
 import os
@@ -12,7 +14,7 @@ import socket
 import sys
 import time
 
-HANG, PROBLEM, DIE, SLOW = 599, 598, 597, 596
+HANG, PROBLEM, DIE, SLOW, GATE, MEMORY = 599, 598, 597, 596, 595, 594
 
 
 class Frames:
@@ -81,7 +83,7 @@ def result_of(case):
             'elements': 1000,
             'dof': 3000,
             'load_steps': 1,
-            'newton_iterations': 5,
+            'newton_iterations': round(force * 1000),
             'factorisations': 5,
             'force_residual': 1e-9,
             'energy_residual': 1e-4,
@@ -98,8 +100,8 @@ def result_of(case):
 
 def solve(frames, message):
     job, case = message['job'], message['case']
-    force = case['F']
-    if force == HANG:
+    force, wish = case['F'], int(case['F'])
+    if wish == HANG:
         frames.say(
             {
                 'say': 'progress',
@@ -112,11 +114,16 @@ def solve(frames, message):
             }
         )
         time.sleep(3600)
-    if force == DIE:
+    if wish == DIE:
         os._exit(3)
+    kept = []
+    while wish == MEMORY:
+        kept.append(bytearray(16 << 20))
+    while wish == GATE and not os.path.exists(f'/tmp/ischia-gate-{os.getppid()}'):
+        time.sleep(0.02)
     steps = 5
     for i in range(steps):
-        time.sleep((1.0 if force == SLOW else 0.01) / steps)
+        time.sleep((1.0 if wish == SLOW else 0.01) / steps)
         frames.say(
             {
                 'say': 'progress',
@@ -128,7 +135,7 @@ def solve(frames, message):
                 'message': 'load step',
             }
         )
-    if force == PROBLEM:
+    if wish == PROBLEM:
         frames.say({'say': 'problem', 'job': job})
         frames.say(
             {

@@ -14,12 +14,24 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 PROGRAM = os.environ.get('ISCHIAD', os.path.join(HERE, '../../build/server/ischiad'))
 FAKE_WORKER = os.path.join(HERE, 'fake_worker.py')
 JSON = {'Content-Type': 'application/json'}
+# How long a test waits for what must happen: no expectation of speed, only something that hangs
+# takes so long. The longest wait that the service itself grants is 60 s.
+PATIENCE_S = 240
 SIDE = {'R1': 7.1, 'R2': 22.8, 'eM': 31, 'eF': 10, 'muM': 8, 'muF': 5, 'F': 258}
 
 
 def side(**changes):
     """The example side with changes; None leaves a key out."""
     return {k: v for k, v in {**SIDE, **changes}.items() if v is not None}
+
+
+def eventually(holds, what):
+    """Waits until holds() is true; returns what it said."""
+    end = time.monotonic() + PATIENCE_S
+    while not (said := holds()):
+        assert time.monotonic() < end, f'waited {PATIENCE_S} s for {what}'
+        time.sleep(0.02)
+    return said
 
 
 class Answer:
@@ -39,33 +51,33 @@ class Answer:
 def admin(state, *words, check=True):
     """Runs an administration command; returns its standard output."""
     done = subprocess.run(
-        [PROGRAM, '--state-dir', state, *words], capture_output=True, text=True, timeout=60
+        [PROGRAM, '--state-dir', state, *words], capture_output=True, text=True, timeout=PATIENCE_S
     )
     if check and done.returncode != 0:
         raise AssertionError(f'{words}: {done.returncode}: {done.stderr}')
     return done.stdout if check else done
 
 
+def command_line(state, *options, listen='127.0.0.1:0', worker=FAKE_WORKER):
+    """How a test starts the daemon; a later option wins."""
+    usual = {
+        '--listen': listen,
+        '--state-dir': state,
+        '--worker-program': worker,
+        '--workers': '1',
+        '--drain-timeout': '2',
+    }
+    return [PROGRAM, *(word for pair in usual.items() for word in pair), *options]
+
+
 class Service:
-    def __init__(self, *options, state=None, worker=FAKE_WORKER, listen='127.0.0.1:0', env=None):
+    def __init__(self, *options, state=None, worker=FAKE_WORKER, listen='127.0.0.1:0', env=None,
+                 within=()):
         self.own_state = state is None
         self.state = state or tempfile.mkdtemp(prefix='ischia-test-')
         self.log = open(os.path.join(self.state, 'stderr.txt'), 'ab')
         self.process = subprocess.Popen(
-            [
-                PROGRAM,
-                '--listen',
-                listen,
-                '--state-dir',
-                self.state,
-                '--worker-program',
-                worker,
-                '--workers',
-                '1',
-                '--drain-timeout',
-                '2',
-                *options,
-            ],
+            [*within, *command_line(self.state, *options, listen=listen, worker=worker)],
             stdout=subprocess.PIPE,
             stderr=self.log,
             text=True,
@@ -73,7 +85,7 @@ class Service:
         )
         line = self.process.stdout.readline()
         if not line.startswith('listening on '):
-            self.process.wait(10)
+            self.process.wait(PATIENCE_S)
             raise AssertionError('did not start: ' + self.errors())
         self.address = line.split('://')[1].strip()
         self.scheme = line.split('://')[0].split()[-1]
@@ -88,10 +100,10 @@ class Service:
         with open(self.log.name, encoding='utf-8', errors='replace') as file:
             return file.read()
 
-    def connect(self, timeout=30):
+    def connect(self, timeout=PATIENCE_S):
         return http.client.HTTPConnection(self.address, timeout=timeout)
 
-    def ask(self, method, path, body=None, headers=None, timeout=30):
+    def ask(self, method, path, body=None, headers=None, timeout=PATIENCE_S):
         connection = self.connect(timeout)
         try:
             if isinstance(body, (dict, list)):
@@ -105,15 +117,15 @@ class Service:
     def get(self, path, **headers):
         return self.ask('GET', path, headers={k.replace('_', '-'): v for k, v in headers.items()})
 
-    def submit(self, wait=20, **changes):
+    def submit(self, wait=60, **changes):
         """Submits a side; returns the document, finished unless wait is 0."""
         headers = {'Prefer': f'wait={wait}'} if wait else {}
-        answer = self.ask('POST', '/v1/assessments', side(**changes), headers, timeout=wait + 30)
+        answer = self.ask('POST', '/v1/assessments', side(**changes), headers)
         assert answer.status in (201, 202), (answer.status, answer.body)
         return answer.json()
 
-    def until(self, identity, *statuses, seconds=20):
-        end = time.monotonic() + seconds
+    def until(self, identity, *statuses):
+        end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
             document = self.get(f'/v1/assessments/{identity}').json()
             if document['status'] in statuses:
@@ -121,11 +133,18 @@ class Service:
             time.sleep(0.05)
         raise AssertionError(f'{identity} is {document["status"]}, not {statuses}')
 
-    def until_ready(self, seconds=20, **headers):
-        end = time.monotonic() + seconds
+    def until_ready(self, **headers):
+        end = time.monotonic() + PATIENCE_S
         while self.ask('GET', '/readyz', headers=headers).status != 200:
             assert time.monotonic() < end, 'never ready'
             time.sleep(0.05)
+
+    def kill(self):
+        """kill -9; what it has stored stays."""
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+        self.log.close()
 
     def signal(self, number):
         self.process.send_signal(number)
@@ -134,7 +153,7 @@ class Service:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
         try:
-            status = self.process.wait(30)
+            status = self.process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             raise

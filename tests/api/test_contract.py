@@ -11,7 +11,7 @@ import tempfile
 import unittest
 import urllib.parse
 
-from service import HERE, JSON, PROGRAM, SIDE, Service, side
+from service import HERE, JSON, PATIENCE_S, PROGRAM, SIDE, Service, side
 
 METHODS = ('get', 'post', 'put', 'patch', 'delete')
 FORM = {'Content-Type': 'application/x-www-form-urlencoded'}
@@ -28,7 +28,7 @@ def install_validators():
         ['npm', 'ci', '--ignore-scripts', '--no-audit', '--no-fund', '--loglevel=error'],
         cwd=HERE,
         check=True,
-        timeout=240,
+        timeout=PATIENCE_S,
     )
     shutil.copyfile(lock, done)
 
@@ -125,7 +125,7 @@ class Contract(unittest.TestCase):
             many,
             many,
             side(F=400.5, subject='T-1', side='left', R2=80),
-            {'Prefer': 'wait=20'},
+            {'Prefer': 'wait=60'},
         )
         ask('POST', many, many, side(F=401.5))
         ask('POST', many, many, side(muM=99))
@@ -133,7 +133,7 @@ class Contract(unittest.TestCase):
         ask('POST', many, many, b'x', {'Content-Type': 'text/plain'})
         ask('POST', many, many, b' ' * 70000, JSON)
         ask('POST', many, many, urllib.parse.urlencode({**SIDE, 'F': 402.5}).encode(), FORM)
-        failed = ask('POST', many, many, side(F=598, eM=22), {'Prefer': 'wait=20'})
+        failed = ask('POST', many, many, side(F=598, eM=22), {'Prefer': 'wait=60'})
         hanging = ask('POST', many, many, side(F=599, eM=22))
         for query in ('', '?limit=1', '?status=failed', '?limit=0'):
             ask('GET', many + query, many)
@@ -196,7 +196,7 @@ class Contract(unittest.TestCase):
                 ['node', os.path.join(HERE, 'contract.mjs'), *files],
                 capture_output=True,
                 text=True,
-                timeout=120,
+                timeout=PATIENCE_S,
             )
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
         self.assertIn(f'{len(asked)} answers fit', checked.stdout)

@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 import unittest
 
-from service import HERE, PROGRAM, Service
+from service import HERE, PATIENCE_S, PROGRAM, Service
 
 ROOT = os.path.join(HERE, '../..')
 
@@ -58,7 +58,7 @@ class Docs(unittest.TestCase):
                     ['bash', '-c', line],
                     env=environment,
                     cwd=folder,
-                    timeout=60,
+                    timeout=PATIENCE_S,
                     capture_output=True,
                     text=True,
                 )
@@ -87,6 +87,16 @@ class Docs(unittest.TestCase):
             [PROGRAM, '--print-config'], capture_output=True, text=True, check=True
         )
         self.assertEqual(given.stdout, usual.stdout)
+
+    def test_invariants_are_numbered_and_their_tests_exist(self):
+        rows = re.findall(r'^\| I(\d+) \|.*\|(.*)\|$', read('docs/INVARIANTS.md'), re.M)
+        self.assertEqual([int(number) for number, _ in rows], list(range(1, len(rows) + 1)))
+        files = {name for _, _, names in os.walk(os.path.join(ROOT, 'tests')) for name in names}
+        for number, tests in rows:
+            named = re.findall(r'`(?:tests/\w+/)?(\w+\.(?:py|c))`', tests)
+            self.assertTrue(named, f'I{number} has no test')
+            for name in named:
+                self.assertIn(name, files, f'I{number}')
 
     def test_operations_names_every_metric(self):
         page = read('docs/OPERATIONS.md')

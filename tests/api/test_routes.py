@@ -56,7 +56,7 @@ class Routes(unittest.TestCase):
         self.assertEqual(done['links']['field'], f'/v1/assessments/{done["id"]}/field.vtu')
 
     def test_prefer_wait_answers_with_the_finished_document(self):
-        answer = self.service.ask('POST', '/v1/assessments', side(F=201.5), {'Prefer': 'wait=20'})
+        answer = self.service.ask('POST', '/v1/assessments', side(F=201.5), {'Prefer': 'wait=60'})
         self.assertEqual(answer.status, 201)
         self.assertEqual(answer.headers['Preference-Applied'], 'wait')
         self.assertEqual(answer.json()['status'], 'succeeded')
@@ -67,7 +67,7 @@ class Routes(unittest.TestCase):
             'POST', '/v1/assessments', side(F=599, eM=30), {'Prefer': 'wait=1'}
         )
         self.assertEqual(answer.status, 202)
-        self.assertLess(time.monotonic() - begun, 5)
+        self.assertLess(time.monotonic() - begun, 50)
         self.assertGreaterEqual(time.monotonic() - begun, 0.9)
         self.assertEqual(
             self.service.ask('POST', answer.headers['Location'] + '/cancel').status, 200
@@ -173,6 +173,24 @@ class Routes(unittest.TestCase):
         wrong = self.service.ask('POST', '/v1/assessments', b'R1=99', kind)
         self.assertIn(('/R1', 'out_of_range'), self.errors(wrong))
 
+    def test_a_decimal_comma_is_a_form_s_alone(self):
+        kind = {'Content-Type': 'application/x-www-form-urlencoded'}
+        form = urllib.parse.urlencode({**SIDE, 'R1': '6,5', 'F': ' 209,5\u202f'}).encode()
+        answer = self.service.ask('POST', '/v1/assessments', form, kind)
+        self.assertEqual(answer.status, 303)
+        document = self.service.get(answer.headers['Location'].rsplit('/', 1)[0]).json()
+        self.assertEqual((document['parameters']['R1'], document['parameters']['F']), (6.5, 209.5))
+        form = urllib.parse.urlencode({**SIDE, 'R2': '1,234.5', 'eM': '31,,5'}).encode()
+        answer = self.service.ask('POST', '/v1/assessments', form, kind)
+        self.assertEqual(self.errors(answer), {('/R2', 'ambiguous'), ('/eM', 'ambiguous')})
+        in_words = 'R2 is "1,234.5" with more than one decimal mark; write 1234.5 or 1234,5'
+        self.assertEqual(answer.json()['errors'][0]['detail'], in_words)
+        answer = self.service.ask('POST', '/v1/assessments', side(R1='6,5'))
+        self.assertEqual(self.errors(answer), {('/R1', 'wrong_type')})
+        json = {'Content-Type': 'application/json'}
+        answer = self.service.ask('POST', '/v1/assessments', b'{"R1": 6,5}', json)
+        self.problem(answer, 400)
+
     def test_a_browser_is_shown_its_faults_in_the_form(self):
         answer = self.service.ask(
             'POST',
@@ -268,7 +286,7 @@ class Routes(unittest.TestCase):
 
     def test_get_waits_for_the_end(self):
         document = self.service.submit(wait=0, F=596, eM=33)
-        answer = self.service.ask('GET', document['links']['self'], headers={'Prefer': 'wait=20'})
+        answer = self.service.ask('GET', document['links']['self'], headers={'Prefer': 'wait=60'})
         self.assertEqual(answer.json()['status'], 'succeeded')
 
     def test_many_wait_at_once(self):
@@ -277,7 +295,7 @@ class Routes(unittest.TestCase):
 
         def wait():
             answer = self.service.ask(
-                'GET', document['links']['self'], headers={'Prefer': 'wait=20'}
+                'GET', document['links']['self'], headers={'Prefer': 'wait=60'}
             )
             seen.append(answer.json()['status'])
 
@@ -310,7 +328,9 @@ class Routes(unittest.TestCase):
         self.service.until(document['id'], 'running')
         self.problem(self.service.get(path + '/field.vtu'), 409)
         self.problem(self.service.ask('DELETE', path), 409)
-        self.assertIn('http-equiv="refresh"', self.service.get(path + '/report').body.decode())
+        page = self.service.get(path + '/report').body.decode()
+        self.assertIn('name="wait" value="60"', page)
+        self.assertNotIn('http-equiv', page)  # a page never reloads by itself
         self.assertEqual(self.service.ask('POST', path + '/cancel').json()['status'], 'cancelled')
         self.assertEqual(self.service.ask('POST', path + '/cancel').status, 200)
         self.assertEqual(self.service.submit(F=213.5)['status'], 'succeeded')
@@ -442,12 +462,15 @@ class Routes(unittest.TestCase):
         self.assertEqual((svg.status, svg.type), (200, 'image/svg+xml'))
         self.assertEqual((vtu.status, vtu.type), (200, 'application/vnd.vtk.vtu'))
         self.assertIn(b'<svg', svg.body)
+        self.assertNotIn(b'style', svg.body)  # attributes alone: the policy allows no inline style
+        self.assertNotIn('unsafe', svg.headers['Content-Security-Policy'])
         self.assertIn(b'<VTKFile', vtu.body)
 
     def test_the_report_is_a_page_that_escapes(self):
-        path = self.service.submit(F=331.5, label='<script>x</script>', subject='R-1')['links'][
-            'self'
-        ]
+        document = self.service.submit(
+            F=331.5, label='<script>x</script>', subject='R-1', side='left'
+        )
+        path = document['links']['self']
         answer = self.service.get(path + '/report')
         page = answer.body.decode()
         self.assertEqual(answer.type, 'text/html')
@@ -459,9 +482,48 @@ class Routes(unittest.TestCase):
             'engineering',
             'section.svg',
             'animal',
-            '331.5 N',
+            'never compare',
+            'Tissue strain report \u00b7 left side',
+            'First at (F = 331.5 N)',
+            'Largest, under the bone',
+            'Name, date, signature',
+            'model macron2020-local 1',
+            document['id'],
+            document['created_at'],
         ):
             self.assertIn(text, page)
+        parameters = self.service.get('/v1/parameters').json()['parameters']
+        for parameter in parameters:  # name, key, value, unit
+            value = document['parameters'][parameter['key']]
+            row = f'{parameter["name"]}</th><td>{parameter["key"]}</td><td class="n">{value:g}</td>'
+            self.assertIn(f'{row}<td>{parameter["unit"]}</td>', page)
+
+    def test_the_report_can_wait_for_the_end(self):
+        document = self.service.submit(wait=0, F=596, eM=44.5)
+        path = document['links']['self'] + '/report'
+        waiting = self.service.get(path).body.decode()
+        self.assertIn('Wait for the result', waiting)
+        self.assertNotIn('Name, date, signature', waiting)
+        self.assertIn('Name, date, signature', self.service.get(path + '?wait=60').body.decode())
+        hanging = self.service.submit(wait=0, F=599, eM=45.5)['links']['self']
+        self.service.until(hanging.rsplit('/', 1)[1], 'running')
+        before = time.monotonic()
+        self.assertIn('Being solved.', self.service.get(hanging + '/report?wait=1').body.decode())
+        self.assertGreater(time.monotonic() - before, 0.9)
+        form = {'Content-Type': 'application/x-www-form-urlencoded'}
+        answer = self.service.ask('POST', hanging + '/cancel', b'', form)
+        self.assertEqual((answer.status, answer.headers['Location']), (303, hanging + '/report'))
+        again = self.service.ask('POST', path.removesuffix('/report') + '/cancel', b'', form)
+        self.assertEqual(again.status, 303)  # too late: the report says how it ended
+        for bad in ('61', '-1', 'x', '', '1&wait=2'):
+            self.problem(self.service.get(f'{path}?wait={bad}'), 400)
+
+    def test_a_page_keeps_its_policy_when_it_has_not_changed(self):
+        page = self.service.get('/')
+        again = self.service.get('/', If_None_Match=page.headers['ETag'])
+        self.assertEqual(again.status, 304)
+        self.assertNotIn('Content-Security-Policy', again.headers)  # a browser would take it over
+        self.assertEqual(again.headers['X-Content-Type-Options'], 'nosniff')
 
     def test_pages_need_nothing_from_elsewhere(self):
         for path in ('/', '/form', '/docs', '/assessments'):
@@ -492,7 +554,9 @@ class Routes(unittest.TestCase):
         self.assertEqual(self.service.get('/readyz').json()['status'], 'ready')
         version = self.service.get('/version').json()
         self.assertEqual(version['model'], {'name': 'macron2020-local', 'version': 1})
-        self.assertTrue(version['libraries']['libmicrohttpd'])
+        for name in ('libmicrohttpd', 'GnuTLS', 'libsodium', 'zlib', 'cJSON', 'store'):
+            self.assertRegex(version['libraries'][name], r'\d+\.\d+')
+        self.assertEqual(version['worker'], 'fake')
         metrics = self.service.get('/metrics').body.decode()
         for line in (
             'ischia_http_requests_total{route="GET /healthz",code="200"}',

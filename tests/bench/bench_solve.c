@@ -115,11 +115,8 @@ struct row {
 static int split(char *line, char **ret)
 {
     int count = 0;
-    for (char *at = line; count < FIELDS_MAX; at = NULL) {
-        char *field = strtok(at, ",\r\n");
-        if (field == NULL) break;
-        ret[count++] = field;
-    }
+    line[strcspn(line, "\r\n")] = '\0';
+    for (char *rest = line; rest != NULL && count < FIELDS_MAX;) ret[count++] = strsep(&rest, ",");
     return count;
 }
 

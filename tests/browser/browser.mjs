@@ -2,8 +2,12 @@
 //
 // What every browser test needs: Debian's Chromium, pages that are watched, axe-core.
 import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
+import { mkdtemp, readFile, rm } from 'node:fs/promises';
 import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { chromium } from 'playwright-core';
 import { StandIn } from './stand_in.mjs';
@@ -83,6 +87,48 @@ export async function assert_accessible(page, what) {
   assert.ok(passes.length > 10, `${what}: axe looked at too little`);
 }
 
+/* What a page looks like on paper: the number of pages, their size in points, the text of each. */
+export async function on_paper(page) {
+  const folder = await mkdtemp(join(tmpdir(), 'ischia-print-'));
+  try {
+    const path = join(folder, 'page.pdf');
+    await page.pdf({ path, preferCSSPageSize: true });
+    const info = execFileSync('pdfinfo', [path], { encoding: 'utf8' });
+    const [, width, height] = /Page size:\s+([\d.]+) x ([\d.]+)/.exec(info);
+    const text = execFileSync('pdftotext', ['-layout', path, '-'], { encoding: 'utf8' });
+    return {
+      pages: Number(/Pages:\s+(\d+)/.exec(info)[1]),
+      is_a4: Math.abs(width - 595.3) < 1 && Math.abs(height - 841.9) < 1,
+      text: text.split('\f'),
+      bytes: (await readFile(path)).length,
+    };
+  } finally {
+    await rm(folder, { recursive: true });
+  }
+}
+
+/* What sticks out of a report where paper cuts it off; empty when all of it is printed. */
+export async function cut_off(page) {
+  const paper = { width: 688, height: 1010 }; /* A4 less its margins, in CSS pixels */
+  const before = page.viewportSize();
+  await page.setViewportSize(paper);
+  await page.emulateMedia({ media: 'print' });
+  const found = await page.evaluate(() =>
+    [...document.querySelectorAll('.report')].flatMap((report) => {
+      const edge = report.getBoundingClientRect();
+      return [...report.querySelectorAll('td, th, p, li, h1, h2, h3, img, caption')]
+        .filter((e) => {
+          const box = e.getBoundingClientRect();
+          return box.right > edge.right + 1 || box.bottom > edge.bottom + 1;
+        })
+        .map((e) => e.textContent || e.tagName);
+    }),
+  );
+  await page.emulateMedia({ media: null });
+  await page.setViewportSize(before);
+  return found;
+}
+
 /* A stand-in daemon and a browser for one test file; `finish` ends both. */
 export async function stage(options) {
   const daemon = new StandIn(dist);
@@ -119,6 +165,31 @@ export async function submit_and_wait(page, sides = 2) {
   await page.click('button[type=submit]');
   await page.waitForURL('**/assessments/**');
   await page.waitForFunction((n) => document.querySelectorAll('.glance').length === n, sides);
+}
+
+/* What is animated or takes time to change, as seen by the browser. */
+export const moving = (page) =>
+  page.evaluate(() =>
+    [...document.querySelectorAll('*')]
+      .filter((e) => {
+        const style = getComputedStyle(e);
+        const slow = style.transitionDuration.split(',').some((d) => parseFloat(d) > 0);
+        return slow || style.animationName !== 'none' || e.getAnimations().length > 0;
+      })
+      .map((e) => e.outerHTML.slice(0, 80)),
+  );
+
+/* Where Tab goes from an element on: the accessible names, as the browser computes them. */
+export async function tab_order(page, selector, steps) {
+  await page.locator(selector).focus();
+  const names = [];
+  for (let i = 0; i < steps; i++) {
+    await page.keyboard.press('Tab');
+    const focused = page.locator('*:focus');
+    const [line] = (await focused.ariaSnapshot()).split('\n');
+    names.push(line.replace(/^- /, ''));
+  }
+  return names;
 }
 
 export const reading = (page, side, key) => page.locator(`#${side}-${key}-reading`);

@@ -9,6 +9,7 @@ import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 import { assert_clean, dist, stage } from './browser.mjs';
+import { parameters } from './stand_in.mjs';
 
 let s;
 before(async () => {
@@ -111,9 +112,33 @@ test('every language has every string, with the same gaps to fill', async () => 
   assert.deepEqual(names, ['de.ts', 'en.ts', 'fr.ts']);
   const [{ de }, { en }, { fr }] = await Promise.all(names.map((n) => load(`src/lang/${n}`)));
   const gaps = (text) => (text.match(/\{\w+\}/g) ?? []).sort();
+  /* English takes names and help of the numbers from the daemon; the others translate them. */
+  const of_parameters = parameters.parameters.flatMap(({ key }) => [
+    `param.${key}.name`,
+    `param.${key}.help`,
+  ]);
+  const own = (strings) => Object.keys(strings).filter((key) => !of_parameters.includes(key));
+  assert.deepEqual(own(en), Object.keys(en));
   for (const other of [de, fr]) {
-    assert.deepEqual(Object.keys(other), Object.keys(en));
+    assert.deepEqual(own(other), Object.keys(en));
+    for (const key of of_parameters) assert.ok(other[key], key);
     for (const key of Object.keys(en)) assert.deepEqual(gaps(other[key]), gaps(en[key]), key);
+  }
+});
+
+/* Words between tags, or in an attribute that is read out, belong into lang/. */
+test('no text for people stands in the components', async () => {
+  const folder = join(source, 'src');
+  const files = (await readdir(folder, { recursive: true })).filter((f) => f.endsWith('.tsx'));
+  assert.ok(files.length > 12);
+  for (const file of files) {
+    const code = (await readFile(join(folder, file), 'utf8')).replace(/\/\*[^]*?\*\//g, '');
+    const found = [
+      ...code.matchAll(/^ *([A-Z][a-z]+ [a-z][^={}();<>]*)$/gm),
+      ...code.matchAll(/<[a-z]\w*[^<>]*>\s*([A-Za-z][a-z]{2,}[^<>{}=]*)</g),
+      ...code.matchAll(/(?:aria-label|title|alt|placeholder)="([^"]+)"/g),
+    ].map((m) => m[1]);
+    assert.deepEqual(found, [], file);
   }
 });
 

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page against ischiad itself, which solves: ISCHIAD and ISCHIA name the two programs. The
-// solves are coarse ones, but for the one that is cancelled, so that the file takes seconds; what is
-// shown must be what was computed.
+// The page against ischiad itself, which solves: ISCHIAD and ISCHIA name the two programs. The first
+// person is solved as the form is set; the other solves are coarse ones, but for those that are
+// interrupted, so that the file takes seconds. What is shown must be what was computed.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
+import { readFile } from 'node:fs/promises';
 import { after, afterEach, before, beforeEach, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
 import {
   assert_accessible,
   assert_clean,
+  cut_off,
   launch,
+  on_paper,
   open_form,
   sample,
   watched_page,
@@ -17,6 +21,9 @@ import { Daemon } from './daemon.mjs';
 
 const { ISCHIAD, ISCHIA } = process.env;
 const solve_ms = 240_000;
+const reference_file = fileURLToPath(
+  new URL('../../static/reference/table2.json', import.meta.url),
+);
 
 let daemon, origin, browser, page;
 before(async () => {
@@ -45,7 +52,7 @@ async function submit_sample(force, resolution = 'coarse') {
   await open_form(page, origin);
   await page.getByRole('button', { name: 'Fill in' }).click();
   if (force) for (const side of ['left', 'right']) await page.fill(`#${side}-F`, force);
-  await page.selectOption('.submit select', resolution);
+  if (resolution) await page.selectOption('.submit select', resolution);
   await page.click('button[type=submit]');
   await page.waitForURL('**/assessments/**');
   const url = new URL(page.url());
@@ -57,8 +64,33 @@ const all_ended = (n) =>
     timeout: solve_ms,
   });
 
+test('the first page: what crosses the wire, and how soon it can be used', async () => {
+  const wire = await page.context().newCDPSession(page);
+  await wire.send('Network.enable');
+  const sizes = [];
+  wire.on('Network.loadingFinished', (e) => sizes.push(e.encodedDataLength));
+  const answer = await page.goto(`${origin}/`, { waitUntil: 'networkidle' });
+  assert.doesNotMatch(answer.headers()['content-security-policy'], /unsafe/);
+  assert.ok(sizes.length >= 4, `${sizes}`);
+  const total = sizes.reduce((a, b) => a + b, 0);
+  assert.ok(total <= 100 * 1024, `${total} bytes`);
+  const times = [];
+  for (let i = 0; i < 5; i++) {
+    await page.reload();
+    await page.locator('fieldset.side').first().waitFor();
+    times.push(
+      await page.evaluate(() => {
+        const [visit] = performance.getEntriesByType('navigation');
+        const [limits] = performance.getEntriesByName(`${location.origin}/v1/parameters`);
+        return limits.responseEnd - visit.requestStart;
+      }),
+    );
+  }
+  assert.ok(Math.min(...times) < 200, `${times.map(Math.round)} ms`);
+});
+
 test('both sides of a person of Table 2: what is shown is what was computed', async () => {
-  const ids = await submit_sample();
+  const ids = await submit_sample(null, null);
   await all_ended(2);
   for (const [i, side] of ['Left', 'Right'].entries()) {
     const { result, parameters } = await document_of(ids[i]);
@@ -77,13 +109,26 @@ test('both sides of a person of Table 2: what is shown is what was computed', as
   const input = JSON.stringify(
     Object.fromEntries(Object.entries(sample.left).map(([key, text]) => [key, Number(text)])),
   );
-  const output = execFileSync(ISCHIA, ['solve', '-', '--resolution', 'coarse'], {
+  const output = execFileSync(ISCHIA, ['solve', '-'], {
     input,
     encoding: 'utf8',
     stdio: ['pipe', 'pipe', 'ignore'],
   });
   const shown = (await document_of(ids[0])).result;
   assert.deepEqual(shown.strain, JSON.parse(output).strain);
+
+  /* The strip plot holds it against the reference sides, which this program must still compute. */
+  const strips = page.getByRole('region', { name: 'Against 26 sides of Table 2' });
+  assert.equal(await strips.locator('svg.strip').count(), 3);
+  assert.equal(await strips.locator('svg.strip').first().locator('.reference').count(), 26);
+  assert.equal(await strips.locator('svg.strip').first().locator('.ours').count(), 2);
+  const reference = JSON.parse(await readFile(reference_file, 'utf8'));
+  assert.deepEqual(reference.model, shown.model);
+  const ours = reference.sides.find((s) => s.subject === 'table2-1' && s.side === 'left');
+  assert.ok(
+    Math.abs(ours.eps_max - shown.strain.eps_max) <= ours.eps_max_error,
+    'static/reference/table2.json is out of date: node static/make-reference.mjs ISCHIA',
+  );
 });
 
 test('the 3-D view and the section draw the field of the daemon', async () => {
@@ -121,23 +166,120 @@ test('the daemon is killed in the middle of a solve, comes back, and the page re
   for (const id of ids) assert.equal((await document_of(id)).status, 'succeeded');
 });
 
-test('without JavaScript: a plain submit is answered with the report', async () => {
-  const plain = await watched_page(browser, origin, { javaScriptEnabled: false });
+const plain_page = () => watched_page(browser, origin, { javaScriptEnabled: false });
+
+test('without JavaScript: limits, a comma, a fault beside its field, then the report', async () => {
+  const plain = await plain_page();
   await plain.goto(`${origin}/`);
   const limits = await (await fetch(`${origin}/v1/parameters`)).json();
-  for (const { key, unit, accepted } of limits.parameters) {
+  for (const { key, name, unit, accepted } of limits.parameters) {
     const range = `${accepted.min} to ${accepted.max} ${unit}`;
     assert.equal(await plain.locator(`#${key}-range`).innerText(), range);
+    assert.ok((await plain.locator(`label[for=${key}]`).innerText()).includes(name), name);
   }
   for (const [key, text] of Object.entries(sample.left)) await plain.fill(`#${key}`, text);
+  await plain.fill('#R1', '7,1');
+  await plain.fill('#R2', '1,234.5');
   await plain.fill('#subject', 'plain-1');
   await plain.click('button[type=submit]');
+  assert.match(await plain.locator('#R2-fault').innerText(), /"1,234.5" with more than one/);
+  assert.equal(await plain.inputValue('#R1'), '7,1');
+  await plain.fill('#R2', '22,8');
+  await plain.click('button[type=submit]');
   await plain.waitForURL(/\/v1\/assessments\/[^/]+\/report$/);
-  assert.match(await plain.locator('body').innerText(), /plain-1/);
   const id = plain.url().split('/')[5];
-  await fetch(`${origin}/v1/assessments/${id}/cancel`, { method: 'POST' });
+  const { parameters, subject } = await (await fetch(`${origin}/v1/assessments/${id}`)).json();
+  assert.deepEqual([parameters.R1, parameters.R2, subject], [7.1, 22.8, 'plain-1']);
+  const wait = plain.getByRole('button', { name: 'Wait for the result' });
+  if (await wait.count()) await wait.click(); /* the same numbers may have been solved before */
+  await plain
+    .getByText('Muscle strain crosses both damage thresholds.')
+    .waitFor({ timeout: solve_ms });
+  assert.match(await plain.locator('body').innerText(), /Subject plain-1/);
   assert_clean(plain);
   await plain.context().close();
+});
+
+test('without JavaScript: waiting, cancelled, and what is read aloud of both', async () => {
+  const slow = { ...sample.left, F: 257.5, resolution: 'fine' };
+  const numbers = Object.entries(slow).map(([key, value]) => [
+    key,
+    key === 'resolution' ? value : Number(value),
+  ]);
+  const answer = await fetch(`${origin}/v1/assessments`, {
+    method: 'POST',
+    headers: { 'Content-Type': 'application/json' },
+    body: JSON.stringify(Object.fromEntries(numbers)),
+  });
+  const { id } = await answer.json();
+  await page.goto(`${origin}/v1/assessments/${id}/report`);
+  await page.getByText(/Being solved|Waiting for a solver/).waitFor();
+  await assert_accessible(page, 'a report that waits');
+  await page.getByRole('button', { name: 'Cancel' }).click();
+  await page.getByText('There is no result.').waitFor();
+  await assert_accessible(page, 'the report of a cancelled assessment');
+});
+
+test('the report of the daemon is one A4 page and has all that a report must', async () => {
+  await submit_sample();
+  await all_ended(2);
+  const id = new URL(page.url()).pathname.split('/')[2];
+  const { result, created_at } = await document_of(id);
+  await page.goto(`${origin}/v1/assessments/${id}/report`);
+  await page.locator('figure img').evaluate((image) => image.decode());
+  await assert_accessible(page, 'the report of the daemon');
+  assert.deepEqual(await cut_off(page), []);
+  const { pages, is_a4, text } = await on_paper(page);
+  assert.deepEqual([pages, is_a4], [1, true]);
+  for (const part of [
+    /left side/,
+    /Smaller bone radius\s+R1\s+7\.1\s+mm/,
+    /engineering/,
+    /Green–Lagrange/,
+    new RegExp(`${result.strain.eps_max.toFixed(3)} ± ${result.numerics.eps_max_error.toFixed(3)}`),
+    new RegExp(`Both at once\\s+${Math.round(result.clusters.both.volume_mm3)}`),
+    /10 mm/ /* scale bar */,
+    /0\.00\s+0\.25[^]*2\.00/ /* colour bar */,
+    /animals/,
+    /not a medical device/,
+    /Ischia \d+\.\d+\.\d+ · model macron2020-local \d+/,
+    new RegExp(id),
+    new RegExp(created_at.replaceAll('.', '\\.')),
+    /Name, date, signature/,
+  ])
+    assert.match(text[0], part);
+
+  /* Everything outside the studied range: seven warnings more, and still one page. */
+  const odd = { R1: 10, R2: 70, eM: 41, eF: 36, muM: 9, muF: 9, F: 100, resolution: 'coarse' };
+  const answer = await fetch(`${origin}/v1/assessments`, {
+    method: 'POST',
+    headers: { 'Content-Type': 'application/json', Prefer: 'wait=60' },
+    body: JSON.stringify({ ...odd, subject: 'x'.repeat(64), label: 'y'.repeat(200) }),
+  });
+  const long = await answer.json();
+  assert.equal(long.status, 'succeeded');
+  await page.goto(`${origin}/v1/assessments/${long.id}/report`);
+  assert.equal(await page.locator('li.warning').count(), 7);
+  assert.deepEqual(await cut_off(page), []);
+  const paper = await on_paper(page);
+  assert.equal(paper.pages, 1);
+  assert.match(paper.text[0], /Name, date, signature/);
+});
+
+test('the other pages of the daemon are accessible too', async () => {
+  for (const path of ['/form', '/docs']) {
+    await page.goto(`${origin}${path}`, { waitUntil: 'networkidle' });
+    await assert_accessible(page, path);
+  }
+  await page.goto(`${origin}/form`);
+  for (const [key, text] of Object.entries(sample.left)) await page.fill(`#${key}`, text);
+  await page.fill('#muM', '99');
+  await page.click('button[type=submit]');
+  const fault = page.getByRole('textbox', { name: /Muscle stiffness/ });
+  assert.equal(await fault.getAttribute('aria-invalid'), 'true');
+  const described = await fault.getAttribute('aria-describedby');
+  assert.match(await page.locator(`#${described}`).innerText(), /accepted 0\.5 to 30 kPa/);
+  await assert_accessible(page, 'the plain form with a fault');
 });
 
 test('the list finds what was computed', async () => {

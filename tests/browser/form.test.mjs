@@ -7,6 +7,7 @@ import {
   assert_accessible,
   assert_clean,
   fill_side,
+  moving,
   open_form,
   reading,
   sample,
@@ -32,12 +33,18 @@ afterEach(async () => {
 const text_of = async (side, key) => (await reading(page, side, key).innerText()).trim();
 const leave = () => page.locator('h1').click();
 
-test('limits, units and names come from the daemon', async () => {
-  for (const { key, unit, accepted, studied } of parameters.parameters) {
+test('label, unit, range and help of every field come from the daemon', async () => {
+  for (const { key, name, unit, description, accepted, studied } of parameters.parameters) {
+    const field = page.locator(`.field:has(#left-${key})`);
+    const label = (await field.locator(`label[for=left-${key}]`).innerText()).replace(/\s+/g, '');
+    assert.ok(label.endsWith(name.replace(/\s+/g, '')), label);
+    assert.equal(await field.locator('.unit').innerText(), unit);
+    assert.ok((await page.locator(`#left-${key}-help`).textContent()).startsWith(description));
     const range = await page.locator(`#left-${key}-range`).innerText();
     assert.ok(range.includes(`${accepted.min} to ${accepted.max} ${unit}`), range);
     assert.ok(range.includes(`studied ${studied.min} to ${studied.max}`), range);
   }
+  await assert_accessible(page, 'the empty form');
 });
 
 test('decimal comma and decimal point mean the same, and the value is echoed', async () => {
@@ -83,6 +90,7 @@ test('outside the studied range is a note, not a fault', async () => {
   await page.fill('#left-muM', '12');
   await leave();
   assert.match(await text_of('left', 'muM'), /Outside the studied range/);
+  await assert_accessible(page, 'the form with a warning');
   assert.equal(await page.getAttribute('#left-muM', 'aria-invalid'), 'false');
 });
 
@@ -101,6 +109,7 @@ test('total thickness gives eM, and says how', async () => {
   await page.getByLabel(/total thickness of muscle and fat instead of eM, Left/).check();
   await page.fill('#left-eM', '41,2');
   assert.equal(await text_of('left', 'eM'), 'eM = 41,2 − 10 = 31.2 mm');
+  await assert_accessible(page, 'the form with a total thickness');
   await page.fill('#left-eM', '80');
   assert.match(await text_of('left', 'eM'), /Above 60 mm/);
   await page.fill('#left-eM', '41.2');
@@ -134,6 +143,32 @@ test('a name is no subject code', async () => {
   await fill_side(page, 'left');
   await page.click('button[type=submit]');
   assert.equal(await page.evaluate(() => document.activeElement.id), 'subject');
+});
+
+test('a date that is not whole is not sent as no date', async () => {
+  await fill_side(page, 'left');
+  await page.locator('#measured_at').pressSequentially('12');
+  await page.locator('h1').click();
+  assert.match(await page.locator('#measured_at-note').innerText(), /Not a whole date/);
+  await assert_accessible(page, 'the form with half a date');
+  const before_count = s.daemon.documents.size;
+  await page.click('button[type=submit]');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'measured_at');
+  assert.equal(s.daemon.documents.size, before_count);
+  await page.fill('#measured_at', '2026-03-01');
+  assert.equal(await page.locator('#measured_at-note').innerText(), '');
+});
+
+test('the muscle left over by a total thickness is judged too', async () => {
+  await fill_side(page, 'left');
+  await page.getByLabel(/total thickness of muscle and fat instead of eM, Left/).check();
+  await page.fill('#left-eM', '12');
+  await leave();
+  assert.match(await text_of('left', 'eM'), /Below 5 mm/); /* 12 - 10 */
+  await page.fill('#left-eF', '');
+  assert.match(await text_of('left', 'eM'), /needs the fat thickness eF/);
+  await page.click('button[type=submit]');
+  assert.match(await page.locator('.errors').innerText(), /Left, eM: missing/);
 });
 
 test('what only the server refuses is shown beside the field', async () => {
@@ -202,10 +237,24 @@ test('the drawing is to scale and shows a slip of the decimal mark', async () =>
   assert.ok((await layer('fat')) > 3 * fat);
 });
 
+test('the drawing names bone, muscle, fat, skin and seat, with their sizes', async () => {
+  await fill_side(page, 'left');
+  const texts = await page.locator('.side.left .drawing text').allTextContents();
+  for (const part of ['bone', 'muscle', 'fat', 'skin 1', 'seat', 'eM 31', 'eF 10'])
+    assert.ok(texts.includes(part), part);
+  assert.ok(
+    texts.some((text) => text.endsWith('R1 7.1')) && texts.some((t) => t.endsWith('R2 22.8')),
+  );
+  for (const name of ['bone', 'tissue.muscle', 'tissue.fat', 'tissue.skin', 'seat'])
+    assert.ok(await page.locator(`.side.left .drawing .${name}`).first().isVisible(), name);
+  const said = await page.locator('.side.left .drawing figcaption').textContent();
+  assert.match(said, /Bone radii R1 7\.1 mm and R2 22\.8 mm, muscle 31 mm, fat 10 mm/);
+});
+
 test('every field has a name, a description and a help text', async () => {
-  const field = page.getByRole('textbox', { name: 'R1 Smaller bone radius' }).first();
+  const field = page.getByRole('textbox', { name: 'R1 Stand-in R1' }).first();
   assert.equal(await field.getAttribute('aria-describedby'), 'left-R1-reading left-R1-range');
-  const help = page.getByRole('button', { name: 'About Smaller bone radius, Left' });
+  const help = page.getByRole('button', { name: 'About Stand-in R1, Left' });
   await help.click();
   assert.equal(await help.getAttribute('aria-expanded'), 'true');
   assert.ok(await page.locator('#left-R1-help').isVisible());
@@ -228,6 +277,38 @@ test('Tab goes through the left side, then the right, then the button', async ()
     visited,
     ['left', 'right'].flatMap((side) => keys.map((key) => `${side}-${key}`)),
   );
+});
+
+test('a screen reader hears the form in order, each control by its name', async () => {
+  await page.fill('#left-R1', '99');
+  await leave();
+  const order = [
+    'heading "New assessment"',
+    'textbox "Subject code"',
+    'combobox "Sample person"',
+    'group "Left"',
+    'button "About Stand-in R1, Left"',
+    'textbox "R1 Stand-in R1"',
+    'Error: Above 15 mm: not accepted',
+    'checkbox "Enter the total thickness of muscle and fat instead of eM, Left"',
+    'textbox "F Stand-in F"',
+    'group "Right"',
+    'textbox "R1 Stand-in R1"',
+    'button "Compute the left side"',
+    'combobox "Resolution"',
+  ];
+  const heard = await page.locator('main').ariaSnapshot();
+  let at = 0;
+  for (const part of order) {
+    const next = heard.indexOf(part, at);
+    assert.ok(next >= at, `${part} after ${heard.slice(0, at).slice(-80)}\n${heard}`);
+    at = next + part.length;
+  }
+});
+
+test('nothing moves on the form for those who asked for stillness', async () => {
+  await page.emulateMedia({ reducedMotion: 'reduce' });
+  assert.deepEqual(await moving(page), []);
 });
 
 test('a keyboard is enough to compute', async () => {

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The result page: progress, outcome, recovery, cancel, comparison, history, lists, paper.
 import assert from 'node:assert/strict';
-import { mkdtemp, readFile, rm } from 'node:fs/promises';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
-import { execFileSync } from 'node:child_process';
+import { readFile } from 'node:fs/promises';
 import { after, afterEach, before, beforeEach, test } from 'node:test';
 import {
   assert_accessible,
   assert_clean,
+  cut_off,
   fill_side,
+  moving,
+  on_paper,
   open_form,
   stage,
   submit_and_wait,
+  tab_order,
 } from './browser.mjs';
 
 let s, page;
@@ -106,6 +107,25 @@ test('a failed solve shows the reason and no number', async () => {
   await assert_accessible(page, 'a failed assessment');
 });
 
+test('a load path that ended is told in the language of the page', async () => {
+  const ends = {
+    diverged_step: /up to 143 N of the 258 N, not beyond/,
+    diverged_checks: /whole force was reached, but what was computed failed its checks/,
+  };
+  await compute('fail-2', ['left']);
+  await all_ended(1);
+  const [document] = [...s.daemon.documents.values()].slice(-1);
+  for (const [reason, expected] of Object.entries(ends)) {
+    Object.assign(document.problem, { reason, last_converged_fraction: 143.2 / 258 });
+    await page.reload();
+    await page.locator('.no-result').waitFor();
+    assert.match(await page.locator('.no-result').innerText(), expected);
+  }
+  await page.selectOption('.language select', 'de');
+  assert.match(await page.locator('.no-result').innerText(), /Die ganze Kraft wurde erreicht/);
+  await assert_accessible(page, 'a failed assessment in German');
+});
+
 test('the daemon restarts in the middle of a solve and the page recovers', async () => {
   await compute('slow-2', ['left']);
   await page.waitForFunction(() => document.querySelector('progress')?.value > 0);
@@ -142,7 +162,7 @@ test('numbers stand in tables beside the charts', async () => {
   await all_ended(2);
   const row = page.getByRole('row', { name: /peak pressure on the skin/ });
   assert.match(await row.innerText(), /142\.3\skPa\s+142\.3\skPa\s+0\.0/);
-  const force = page.getByRole('row', { name: /Force on this side/ }).first();
+  const force = page.getByRole('row', { name: /Stand-in F/ }).first();
   assert.match(await force.innerText(), /258\sN\s+196\sN\s+−62/);
   assert.equal(await page.locator('.curve').first().locator('tbody tr').count(), 13);
   await assert_accessible(page, 'the result with its tables open');
@@ -169,7 +189,12 @@ test('history of the same subject, and the list, its filter and its comparison',
   await page.click('text=Compare the two selected');
   await all_ended(2);
   assert.equal(await page.locator('h1').innerText(), 'Comparison');
-  assert.deepEqual(await page.locator('.card h2').allInnerTexts(), ['A · Left', 'B · Left']);
+  assert.deepEqual(await page.locator('.card h2').allInnerTexts(), [
+    'A · Left',
+    'B · Left',
+    'A · Left: tissue and load curve',
+    'B · Left: tissue and load curve',
+  ]);
   assert.ok(await page.locator('h1').evaluate((e) => e === document.activeElement));
   await assert_accessible(page, 'a comparison');
 });
@@ -201,36 +226,37 @@ test('the list pages through what is older', async () => {
 test('the report prints on one A4 page a side and says what it must', async () => {
   await compute('P-5');
   await all_ended(2);
-  const folder = await mkdtemp(join(tmpdir(), 'ischia-print-'));
-  try {
-    const file = join(folder, 'report.pdf');
-    await page.pdf({ path: file, preferCSSPageSize: true });
-    assert.match(
-      execFileSync('pdfinfo', [file], { encoding: 'utf8' }),
-      /Pages:\s+2\n[^]*Page size:\s+59\d\.\d+ x 84\d\.\d+/,
-    );
-    const text = execFileSync('pdftotext', ['-layout', file, '-'], { encoding: 'utf8' });
-    const first = text.split('\f')[0];
-    for (const part of [
-      /Tissue strain report · Left/,
-      /Subject P-5/,
-      /Both thresholds crossed/,
-      /22\.8\s+mm/,
-      /ε max\s+engineering\s+1\.243 ± 0\.011/,
-      /E shear\s+Green–Lagrange/,
-      /14\s400\s+9\.7\s%\s+1\s+33 N/,
-      /animal experiments/,
-      /Not a medical device/,
-      /Ischia 0\.0\.0/,
-      /macron2020-local 1/,
-      /0192f0c1-/,
-      /signature/,
-    ])
-      assert.match(first, part);
-    assert.doesNotMatch(text, /Change and compute again/);
-    assert.ok((await readFile(file)).length > 5000);
-  } finally {
-    await rm(folder, { recursive: true });
+  const { pages, is_a4, text, bytes } = await on_paper(page);
+  assert.deepEqual([pages, is_a4], [2, true]);
+  for (const part of [
+    /Tissue strain report · Left/,
+    /Subject P-5/,
+    /Both thresholds crossed/,
+    /22\.8\s+mm/,
+    /ε max\s+engineering\s+1\.243 ± 0\.011/,
+    /E shear\s+Green–Lagrange/,
+    /14\s400\s+9\.7\s%\s+1\s+14\s400 mm³, 6\.4 mm\s+33 N/,
+    /animal experiments/,
+    /Not a medical device/,
+    /Ischia 0\.0\.0/,
+    /macron2020-local 1/,
+    /0192f0c1-/,
+    /signature/,
+  ])
+    assert.match(text[0], part);
+  assert.doesNotMatch(text.join(), /Change and compute again/);
+  assert.ok(bytes > 5000);
+  const address = page.url();
+  for (const d of [...s.daemon.documents.values()].slice(-2)) {
+    d.subject = 'x'.repeat(64);
+    d.label = 'y'.repeat(200);
+  }
+  await page.goto(address);
+  await all_ended(2);
+  for (const language of ['en', 'fr', 'de']) {
+    await page.selectOption('.language select', language);
+    assert.deepEqual(await cut_off(page), [], language);
+    assert.equal((await on_paper(page)).pages, 2, language);
   }
 });
 
@@ -249,18 +275,76 @@ test('the list can be saved for a spreadsheet', async () => {
 test('nothing moves for those who asked for stillness', async () => {
   await page.emulateMedia({ reducedMotion: 'reduce' });
   await compute('P-6');
+  await page.locator('.running').first().waitFor();
+  assert.deepEqual(await moving(page), []);
   await all_ended(2);
-  const moving = await page.evaluate(
-    () =>
-      [...document.querySelectorAll('*')].filter((e) => {
-        const style = getComputedStyle(e);
-        return (
-          style.transitionDuration.split(',').some((d) => parseFloat(d) > 0) ||
-          style.animationName !== 'none'
-        );
-      }).length,
-  );
-  assert.equal(moving, 0);
+  assert.deepEqual(await moving(page), []);
+  await page.goto(`${s.origin}/assessments`);
+  await page.locator('table.list').waitFor();
+  assert.deepEqual(await moving(page), []);
+});
+
+test('Tab goes through a result from top to bottom', async () => {
+  await compute('P-8', ['left']);
+  await all_ended(1);
+  const names = await tab_order(page, '.language select', 7);
+  const expected = [
+    /link "Change and compute again"/,
+    /button "Print report"/,
+    /Files/,
+    /button "Section" \[pressed\]/,
+    /button "3-D"/,
+    /Load curve in numbers/ /* to open and close the table */,
+    /group "Load curve in numbers"/ /* to scroll it */,
+  ];
+  expected.forEach((pattern, i) => assert.match(names[i], pattern));
+});
+
+test('Tab goes through the list: filter, actions, rows', async () => {
+  await compute('P-9', ['left']);
+  await all_ended(1);
+  await page.goto(`${s.origin}/assessments?subject=P-9`);
+  await page.locator('table.list').waitFor();
+  const names = await tab_order(page, '#f-subject', 8);
+  const expected = [
+    /combobox "Side"/,
+    /combobox "Status"/,
+    /button "Show"/,
+    /button "As CSV"/,
+    /button "Compare the two selected"/,
+    /group "Past assessments"/,
+    /checkbox "Select P-9, Left, .* for comparison"/,
+    /link "\d/,
+  ];
+  expected.forEach((pattern, i) => assert.match(names[i], pattern));
+});
+
+test('a screen reader hears the answer, then its limits, then the pictures', async () => {
+  await compute('P-10');
+  await all_ended(2);
+  const heard = await page.locator('main').ariaSnapshot();
+  const order = [
+    'heading "Left and right" [level=1]',
+    'region "Left"',
+    'heading "Left" [level=2]',
+    'Both thresholds crossed',
+    'term: Shear over 0.75',
+    'region "Right"',
+    'region "What this does not say"',
+    'animal experiments',
+    'region "Left: tissue and load curve"',
+    'img "Section of the loaded tissue, Left',
+    'img "Load curve, Left',
+    'columnheader "Green–Lagrange"',
+    'region "Right: tissue and load curve"',
+    'region "All numbers"',
+  ];
+  let at = 0;
+  for (const part of order) {
+    const next = heard.indexOf(part, at);
+    assert.ok(next >= at, `${part} is not where it should be:\n${heard}`);
+    at = next + part.length;
+  }
 });
 
 test('a phone shows everything without sideways scrolling', async () => {

@@ -17,9 +17,10 @@ export const csp =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; " +
   "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
 
+/* Names and descriptions are not the daemon's, so that what the page takes from it can be told. */
 const parameter = (key, unit, description, accepted, studied) => ({
   key,
-  symbol: key,
+  name: `Stand-in ${key}`,
   aliases: [],
   unit,
   description,

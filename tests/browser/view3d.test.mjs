@@ -65,8 +65,11 @@ test('the bundle is fetched only when the view is opened, and the view draws', a
   };
   await changed(() => page.getByLabel('Cut open').uncheck());
   await changed(() => page.getByLabel('Cut open').check());
-  await changed(() => page.getByLabel('Only the bodies over both thresholds').check());
-  await changed(() => page.getByLabel('Only the bodies over both thresholds').uncheck());
+  const show = page.getByLabel('Show', { exact: true });
+  await changed(() => show.selectOption('shear'));
+  await changed(() => show.selectOption('compression'));
+  await changed(() => show.selectOption('both'));
+  await changed(() => show.selectOption(''));
   await changed(() => page.getByLabel('Seat').uncheck());
   await changed(() => page.getByLabel('Bone').uncheck());
   await changed(() => page.selectOption('.view3d select', 'E_comp'));
@@ -74,6 +77,24 @@ test('the bundle is fetched only when the view is opened, and the view draws', a
   await changed(() => page.keyboard.press('ArrowLeft'));
   await changed(() => page.keyboard.press('+'));
   await changed(() => page.getByRole('button', { name: 'Reset view' }).click());
+  assert_clean(page);
+  await page.context().close();
+});
+
+test('a criterion that no muscle is over is said to have no bodies', async () => {
+  const page = await s.page();
+  await open_form(page, s.origin);
+  await page.fill('#subject', 'shear-3d');
+  await fill_side(page, 'left');
+  await submit_and_wait(page, 1);
+  await page.getByRole('button', { name: '3-D' }).click();
+  await page.locator('.view3d .loading').waitFor({ state: 'detached' });
+  const show = page.getByLabel('Show', { exact: true });
+  await show.selectOption('shear');
+  assert.equal(await page.getByText('No muscle is over it.').count(), 0);
+  await show.selectOption('both');
+  await page.getByText('No muscle is over it.').waitFor();
+  await assert_accessible(page, 'the 3-D view without bodies');
   assert_clean(page);
   await page.context().close();
 });

@@ -11,6 +11,7 @@ import time
 import uuid
 
 STATES = ("queued", "running", "succeeded", "failed", "cancelled")
+PATIENCE_S = 600  # no expectation of speed: only something that hangs takes so long
 CANCEL_EVERY = 11  # as in harness.c
 FINAL_KINDS = {3: "succeeded", 4: "failed", 5: "cancelled"}
 
@@ -32,17 +33,6 @@ class Harness:
             if line == "ready\n":
                 self.ready.set()
         self.ready.set()
-
-    def workers(self):
-        """Its children, whichever thread started them."""
-        tasks, found = "/proc/%d/task" % self.process.pid, []
-        for task in os.listdir(tasks):
-            try:
-                with open("%s/%s/children" % (tasks, task)) as children:
-                    found += [int(pid) for pid in children.read().split()]
-            except OSError:
-                pass  # a thread that has just ended
-        return found
 
     def kill(self):
         self.process.kill()
@@ -133,8 +123,20 @@ def judge_one(name, n, deed, row, ends, cancelled):
     return faults
 
 
-def kill_one_worker(harness):
-    workers = harness.workers()
+def workers_of(pid):
+    """Its children, whichever thread started them."""
+    found = []
+    try:
+        for task in os.listdir("/proc/%d/task" % pid):
+            with open("/proc/%d/task/%s/children" % (pid, task)) as children:
+                found += [int(child) for child in children.read().split()]
+    except OSError:
+        pass  # a thread that has just ended
+    return found
+
+
+def kill_one_worker(pid):
+    workers = workers_of(pid)
     if workers:
         try:
             os.kill(random.choice(workers), signal.SIGKILL)
@@ -142,8 +144,17 @@ def kill_one_worker(harness):
             pass
 
 
-def wait_for(condition, seconds, what):
-    until = time.monotonic() + seconds
+def count(harness, word):
+    return sum(line.startswith(word + " ") for line in list(harness.lines))
+
+
+def wait_while_alive(harness, condition, what):
+    """Waits for the condition; when the harness ends before, says what it said last."""
+    until = time.monotonic() + PATIENCE_S
     while not condition():
-        assert time.monotonic() < until, "waited %d s for %s" % (seconds, what)
-        time.sleep(0.02)
+        if harness.process.poll() is not None:
+            harness.wait()
+            raise AssertionError("waiting for %s: it ended with %d: %s; its last lines: %s" % (
+                what, harness.process.returncode, harness.error.strip(), harness.lines[-5:]))
+        assert time.monotonic() < until, "waited %d s for %s" % (PATIENCE_S, what)
+        time.sleep(0.01)

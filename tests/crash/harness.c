@@ -6,7 +6,8 @@
  *                                   a promise: "accepted ID N DEED", "cancelled ID"
  *   harness finish DIR FAKE_WORKER  works until nothing is queued or running, says "finished"
  *
- * Refusals by the store go to stdout as well: "refused CODE MESSAGE", ten a second a thread.
+ * Refusals by the store go to stdout as well: "refused CODE MESSAGE", ten a second a thread; those
+ * that the queue itself meets too, so that a full disk shows when the queue is full as well.
  */
 #include <pthread.h>
 #include <stdio.h>
@@ -38,12 +39,23 @@ static void rest_ms(long ms)
     (void)nanosleep(&rest, NULL);
 }
 
-static void refuse(const struct ischia_error *err)
+static void say_refused(const struct ischia_error *err)
 {
     char line[700];
     (void)snprintf(line, sizeof line, "refused %s %s\n", ischia_code_name(err->code), err->message);
     promise(line);
+}
+
+static void refuse(const struct ischia_error *err)
+{
+    say_refused(err);
     rest_ms(100);
+}
+
+static void on_store_error(void *context, const struct ischia_error *err)
+{
+    (void)context;
+    say_refused(err);
 }
 
 static void cancel(const struct uuid *id, const char *text)
@@ -111,38 +123,44 @@ static void finish(struct store *store)
     promise("finished\n");
 }
 
-static int fail(const struct ischia_error *err)
+static int serve(void)
 {
-    (void)fprintf(stderr, "harness: %s\n", err->message);
-    return 1;
+    static const unsigned number[SUBMITTERS] = {0, 1, 2, 3};
+    pthread_t thread;
+    for (int i = 0; i < SUBMITTERS; i++)
+        if (pthread_create(&thread, NULL, submit_for_ever, (void *)(uintptr_t)&number[i]) != 0)
+            return 3;
+    for (;;) rest_ms(1000);
+}
+
+static enum ischia_code run(const char *mode, struct store *store, struct events *events,
+                            const char *worker, struct ischia_error *err)
+{
+    const char *const command[] = {worker, NULL};
+    const struct queue_options options = {
+        .pool = {.command = command, .solve_workers = 2, .backoff_min_ms = 1, .backoff_max_ms = 20},
+        .queued_max = QUEUED_MAX};
+    const struct queue_watcher watcher = {.on_store_error = on_store_error};
+    TRY(queue_create(store, events, &options, &watcher, &queue, err));
+    promise("ready\n");
+    if (strcmp(mode, "serve") == 0) exit(serve());
+    finish(store);
+    queue_destroy(queue, 1000);
+    return ISCHIA_OK;
 }
 
 int main(int argc, char **argv)
 {
     if (argc != 4) return 2;
-    const char *const command[] = {argv[3], NULL};
     const struct store_options options = {.location = argv[2]};
-    const struct queue_options queue_options = {
-        .pool = {.command = command, .solve_workers = 2, .backoff_min_ms = 1, .backoff_max_ms = 20},
-        .queued_max = QUEUED_MAX};
-    struct store *store;
-    struct events *events;
+    struct store *store = NULL;
+    struct events *events = NULL;
     struct ischia_error err = {0};
-    if (store_open(&options, &store, &err) != ISCHIA_OK) return fail(&err);
-    if (events_create(&events, &err) != ISCHIA_OK) return fail(&err);
-    if (queue_create(store, events, &queue_options, NULL, &queue, &err) != ISCHIA_OK)
-        return fail(&err);
-    promise("ready\n");
-    static const unsigned number[SUBMITTERS] = {0, 1, 2, 3};
-    pthread_t thread;
-    for (int i = 0; strcmp(argv[1], "serve") == 0 && i < SUBMITTERS; i++)
-        if (pthread_create(&thread, NULL, submit_for_ever, (void *)(uintptr_t)&number[i]) != 0)
-            return 3;
-    if (strcmp(argv[1], "serve") == 0)
-        for (;;) rest_ms(1000);
-    finish(store);
-    queue_destroy(queue, 1000);
+    enum ischia_code code = store_open(&options, &store, &err);
+    if (code == ISCHIA_OK) code = events_create(&events, &err);
+    if (code == ISCHIA_OK) code = run(argv[1], store, events, argv[3], &err);
+    if (code != ISCHIA_OK) (void)fprintf(stderr, "harness: %s\n", err.message);
     events_destroy(events);
     store_close(store);
-    return 0;
+    return code == ISCHIA_OK ? 0 : 1;
 }

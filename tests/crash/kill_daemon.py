@@ -11,16 +11,18 @@ import sys
 import tempfile
 import time
 
-from crash import Harness, Promises, judge, kill_one_worker
+from crash import (PATIENCE_S, Harness, Promises, count, judge, kill_one_worker,
+                   wait_while_alive)
 
 
 def one_life(program, directory, worker, promises):
     harness = Harness("serve", program, directory, worker)
     if random.random() < 0.9:
-        harness.ready.wait(30)
-        time.sleep(random.uniform(0, 0.2))
+        goal = random.randint(0, 12)  # a number, not a time: a slow machine has its load too
+        wait_while_alive(harness, lambda: count(harness, "accepted") >= goal, "accepted requests")
+        time.sleep(random.uniform(0, 0.1))
         if random.random() < 0.5:
-            kill_one_worker(harness)
+            kill_one_worker(harness.process.pid)
             time.sleep(random.uniform(0, 0.03))
     else:
         time.sleep(random.uniform(0, 0.02))  # while it opens and recovers
@@ -37,7 +39,7 @@ def main(program, worker, moments, seed):
         for _ in range(moments):
             one_life(program, directory, worker, promises)
         last = Harness("finish", program, directory, worker)
-        status = last.wait(300)
+        status = last.wait(PATIENCE_S)
         assert status == 0 and "finished" in last.lines, last.error
         faults, states = judge(directory, promises)
     print("%d kills (seed %d): %d accepted, %d cancelled; states %s" %

@@ -16,7 +16,7 @@ for target in $targets; do
   found=build-fuzz/found/$target
   mkdir -p "$found"
   echo "fuzz_$target: $seconds s"
-  build-fuzz/tests/fuzz/"fuzz_$target" -max_total_time="$seconds" -max_len=8192 -timeout=5 \
+  build-fuzz/tests/fuzz/"fuzz_$target" -max_total_time="$seconds" -max_len=8192 -timeout=60 \
     -artifact_prefix="build-fuzz/$target-" -print_final_stats=1 -verbosity=0 \
     "$found" "tests/fuzz/corpus/$target"
 done

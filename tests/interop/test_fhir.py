@@ -116,7 +116,7 @@ class Fhir(unittest.TestCase):
         report = resources(document, 'DiagnosticReport')[0]
         page = base64.b64decode(report['presentedForm'][0]['data']).decode()
         self.assertEqual(report['presentedForm'][0]['size'], len(page.encode()))
-        self.assertIn('<h1>Tissue under one ischium</h1>', page)
+        self.assertIn('<h1>Tissue strain report', page)
         self.assertNotRegex(page, r'(src|href)=')
 
     def test_the_definitions_are_served(self):

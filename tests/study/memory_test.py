@@ -25,7 +25,7 @@ def run(*arguments, nth=0):
         capture_output=True,
         text=True,
         env=environment,
-        timeout=60,
+        timeout=600,
         check=False,
     )
 

@@ -19,7 +19,7 @@ VALIDATION = ROOT / "docs/validation"
 
 def run(*command, status=0):
     done = subprocess.run(
-        [str(c) for c in command], capture_output=True, text=True, timeout=120, check=False
+        [str(c) for c in command], capture_output=True, text=True, timeout=600, check=False
     )
     if done.returncode != status:
         raise AssertionError(

@@ -44,7 +44,7 @@ def run(*arguments, status=0, **environment):
         capture_output=True,
         text=True,
         env={**os.environ, **environment},
-        timeout=120,
+        timeout=600,
     )
     if done.returncode != status:
         raise AssertionError(
@@ -236,9 +236,9 @@ class Resuming(InTemporaryFolder):
             [PROGRAM, "study", "factorial", TABLE1, "-o", out, "-j", "1", "-q"],
             env={**os.environ, "ISCHIA_DOUBLE_DELAY_MS": "50"},
         )
-        while not (self.path / "out.csv.journal").exists():
-            time.sleep(0.01)
-        time.sleep(0.1)
+        journal = self.path / "out.csv.journal"
+        while not journal.exists() or journal.stat().st_size == 0:
+            time.sleep(0.01)  # it has the lock before it writes
         said = run("factorial", TABLE1, "-o", out, "-q", status=2).stderr
         first.kill()
         first.wait()
@@ -249,14 +249,16 @@ class Resuming(InTemporaryFolder):
             [PROGRAM, "study", "factorial", TABLE1, "-o", self.path / "o.csv", "-j", "2", "-q"],
             env={**os.environ, "ISCHIA_DOUBLE_DELAY_MS": "200"},
         )
-        time.sleep(0.3)
-        children = (
-            pathlib.Path(f"/proc/{study.pid}/task/{study.pid}/children").read_text().split()
-        )
+        path = pathlib.Path(f"/proc/{study.pid}/task/{study.pid}/children")
+        for _ in range(5000):
+            children = path.read_text().split()
+            if len(children) == 2:
+                break
+            time.sleep(0.02)
         self.assertEqual(len(children), 2)
         study.kill()
         study.wait()
-        for _ in range(100):
+        for _ in range(5000):
             alive = [
                 c
                 for c in children
@@ -345,7 +347,7 @@ class Columns(InTemporaryFolder):
             out.write(",".join(factors) + "\n")
             out.writelines(",".join(r[f] for f in factors) + "\n" for r in study)
         command = [PROGRAM, "cohort", self.path / "in.csv", "-o", self.path / "cohort.csv"]
-        subprocess.run(command, capture_output=True, check=False, timeout=120)
+        subprocess.run(command, capture_output=True, check=False, timeout=600)
         cohort = rows_of(self.path / "cohort.csv")
         self.assertEqual(len(cohort), 79)
         for ours, theirs in zip(study, cohort):

@@ -27,6 +27,7 @@ static void tables_are_complete(void **state)
         assert_non_null(p->key);
         assert_non_null(p->unit);
         assert_non_null(p->description);
+        assert_non_null(p->name);
         assert_true(p->accepted_min > 0 && p->accepted_min < p->studied_min);
         assert_true(p->studied_min < p->studied_max && p->studied_max < p->accepted_max);
     }

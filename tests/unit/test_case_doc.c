@@ -329,19 +329,55 @@ static void a_form_is_read(void **state)
     assert_string_equal(request.subject, "");
 }
 
-static void form_numbers_are_strict(void **state)
+/* The form for one value of muM: "+" is a space in a form, so it is escaped. */
+static void read_form_muM(const char *muM)
 {
-    static const char *const bad[] = {"8,0", "8.",    ".8", "+8",    "0x8",
-                                      "nan", "8 kPa", "٨",  "1e999", "inf"};
+    char text[120];
+    (void)snprintf(text, sizeof text, "R1=7&R2=22&eM=31&eF=10&muM=%s%s&muF=5&F=258",
+                   muM[0] == '+' ? "%2B" : "", muM + (muM[0] == '+'));
+    assert_int_equal(read_form(text), ISCHIA_OK);
+}
+
+static void form_numbers_are_as_typed(void **state)
+{
+    static const char *const eight[] = {"8,0", "8.0", "8.", "+8", "08", "%C2%A08", "8e0", ",8e1"};
+    static const char *const bad[] = {"0x8", "nan", "8 kPa", "٨", "1e999", "inf", "8,e"};
     (void)state;
+    for (size_t i = 0; i < sizeof eight / sizeof eight[0]; i++) {
+        read_form_muM(eight[i]);
+        expect_faults(0);
+        assert_true(request.values.param[ISCHIA_MUM] == 8);
+    }
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        char text[120];
-        (void)snprintf(text, sizeof text, "R1=7&R2=22&eM=31&eF=10&muM=%s%s&muF=5&F=258",
-                       bad[i][0] == '+' ? "%2B" : "", bad[i] + (bad[i][0] == '+'));
-        assert_int_equal(read_form(text), ISCHIA_OK);
+        read_form_muM(bad[i]);
         expect_faults(1);
         assert_string_equal(faults.item[0].pointer, "/muM");
     }
+    assert_int_equal(read_form("R1=7,1&R2=22&eM=31&eF=10&muM=8&muF=5&F=258&skin.mu=66,5"),
+                     ISCHIA_OK);
+    expect_faults(0);
+    assert_true(request.values.option[ISCHIA_SKIN_MU] == 66.5);
+}
+
+static void two_decimal_marks_are_refused(void **state)
+{
+    (void)state;
+    read_form_muM("1,234.5");
+    expect_faults(1);
+    expect_fault(0, "/muM", "ambiguous",
+                 "muM is \"1,234.5\" with more than one decimal mark; write 1234.5 or 1234,5");
+}
+
+/* Only a person's form: JSON and the rows of a CSV file have one way to write a number. */
+static void other_numbers_stay_strict(void **state)
+{
+    struct case_doc_fields fields;
+    (void)state;
+    doc_faults_init(&faults);
+    case_doc_fields_init(&fields, &request, &faults);
+    case_doc_fields_set(&fields, "muM", "8,0");
+    expect_faults(1);
+    assert_string_equal(faults.item[0].code, "wrong_type");
 }
 
 static void form_faults(void **state)
@@ -417,7 +453,9 @@ int main(void)
         cmocka_unit_test(columns_with_units),
         cmocka_unit_test(option_keys_agree_with_the_table),
         cmocka_unit_test(a_form_is_read),
-        cmocka_unit_test(form_numbers_are_strict),
+        cmocka_unit_test(form_numbers_are_as_typed),
+        cmocka_unit_test(two_decimal_marks_are_refused),
+        cmocka_unit_test(other_numbers_stay_strict),
         cmocka_unit_test(form_faults),
         cmocka_unit_test(broken_forms),
         cmocka_unit_test(what_is_written_reads_back),

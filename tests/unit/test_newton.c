@@ -18,7 +18,7 @@ static const double size_mm[3] = {10, 10, 10};
 /* Parts point to each other, so it must not be copied. */
 static void bench_make(struct bench *b, double friction)
 {
-    static const struct element_material tissue = {0.005, 0.5, 0.025};
+    static const struct element_material tissue = {0.005, 0.5, 0.025, 0.0005};
     const struct element_material material[TISSUE_COUNT] = {tissue, tissue, tissue};
     struct ischia_error err;
     *b = (struct bench){0};

@@ -80,6 +80,27 @@ static void a_failed_solve_says_how_far_it_came(void **state)
     free(text);
 }
 
+/* It reached all of the force: nothing may read as if it had stopped before. */
+static void a_result_that_failed_its_checks_says_so(void **state)
+{
+    const struct ischia_request request = sample_request();
+    struct ischia_result failure = sample_failure();
+    struct problem problem;
+    (void)state;
+    failure.numerics.reason = ISCHIA_DIVERGED_CHECKS;
+    failure.numerics.last_converged_F_N = 258;
+    (void)snprintf(failure.numerics.detail, sizeof failure.numerics.detail, "det F is -0.1");
+    problem_from_result(&problem, &request.values, &failure);
+    assert_string_equal(problem.detail, "The whole force of 258 N was reached, but what was "
+                                        "computed failed its checks: det F is -0.1");
+    assert_string_equal(problem.reason, "diverged_checks");
+    assert_true(problem.last_converged_fraction == 1);
+    failure.numerics.detail[0] = '\0';
+    problem_from_result(&problem, &request.values, &failure);
+    assert_string_equal(problem.detail, "The whole force of 258 N was reached, but what was "
+                                        "computed failed its checks.");
+}
+
 static void codes_have_kinds(void **state)
 {
     const struct ischia_error limit = {.code = ISCHIA_E_LIMIT, .message = "too much"};
@@ -117,6 +138,7 @@ int main(void)
         cmocka_unit_test(members_without_a_value_are_left_out),
         cmocka_unit_test(faults_are_errors),
         cmocka_unit_test(a_failed_solve_says_how_far_it_came),
+        cmocka_unit_test(a_result_that_failed_its_checks_says_so),
         cmocka_unit_test(codes_have_kinds),
         cmocka_unit_test(other_documents_are_refused),
     };

@@ -17,7 +17,7 @@
 
 #include "server/queue.h"
 
-enum { WAIT_MS = 20000 };
+enum { WAIT_MS = 100000 };
 
 struct room {
     char directory[64];
@@ -56,7 +56,7 @@ static void open_queue(struct room *room, int queued_max)
                                                          .poll_ms = 50,
                                                          .backoff_min_ms = 1,
                                                          .backoff_max_ms = 50,
-                                                         .solve_deadline_ms = 400},
+                                                         .solve_deadline_ms = 3000},
                                                 .queued_max = queued_max};
     const struct queue_watcher watcher = {
         .context = room, .on_finished = on_finished, .on_store_error = on_store_error};
@@ -213,7 +213,7 @@ static void test_cancel_stops_what_runs_and_what_waits(void **state)
     struct ischia_error err;
     enum queue_state was;
     enum store_answer answer;
-    const struct store_accepted running = accept(room, "{\"do\":\"slow\",\"ms\":300,\"n\":1}");
+    const struct store_accepted running = accept(room, "{\"do\":\"slow\",\"ms\":2500,\"n\":1}");
     await_state(room, &running.id, QUEUE_RUNNING);
     const struct store_accepted waiting = accept(room, "{\"n\":2}");
     assert_int_equal(queue_cancel(room->queue, &waiting.id, &was, &answer, &err), ISCHIA_OK);
@@ -232,7 +232,7 @@ static void test_cancel_stops_what_runs_and_what_waits(void **state)
 static void test_full_queue_and_cache(void **state)
 {
     struct room *room = *state;
-    const struct store_accepted first = accept(room, "{\"do\":\"slow\",\"ms\":200,\"n\":1}");
+    const struct store_accepted first = accept(room, "{\"do\":\"slow\",\"ms\":1500,\"n\":1}");
     await_state(room, &first.id, QUEUE_RUNNING);
     const struct store_accepted second = accept(room, "{\"n\":2}");
     (void)accept(room, "{\"n\":3}");
@@ -246,7 +246,7 @@ static void test_full_queue_and_cache(void **state)
 static void test_restart_goes_on_where_it_was(void **state)
 {
     struct room *room = *state;
-    const struct store_accepted slow = accept(room, "{\"do\":\"slow\",\"ms\":300,\"n\":1}");
+    const struct store_accepted slow = accept(room, "{\"do\":\"slow\",\"ms\":1500,\"n\":1}");
     const struct store_accepted waiting = accept(room, "{\"n\":2}");
     await_state(room, &slow.id, QUEUE_RUNNING);
     close_queue(room, 0); /* taken back, not ended */

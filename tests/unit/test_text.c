@@ -57,6 +57,81 @@ static void only_json_numbers_are_numbers(void **state)
     assert_false(text_to_number(longest, TEXT_NUMBER_LENGTH_MAX + 1, &value));
 }
 
+static void numbers_are_read_as_people_type_them(void **state)
+{
+    static const struct {
+        const char *text;
+        double value;
+    } good[] = {
+        {"7.1", 7.1},
+        {"7,1", 7.1},
+        {" 7 ", 7},
+        {".5", 0.5},
+        {",5", 0.5},
+        {"5,", 5},
+        {"+3", 3},
+        {"-2,5", -2.5},
+        {"\xE2\x88\x92"
+         "2",
+         -2},
+        {"007", 7},
+        {"2,58e2", 258},
+        {"\xC2\xA0"
+         "8\xE2\x80\xAF ",
+         8},
+    };
+    static const char *const ambiguous[] = {"1,234.5", "1.234,5", "1,2,3",    "1.2.3",
+                                            "..1",     "-1,,2",   "1,234.5e2"};
+    static const char *const bad[] = {
+        "",
+        " ",
+        "\xC2\xA0",
+        "x",
+        "7 mm",
+        "0x10",
+        "1 234",
+        "--1",
+        "+-1",
+        ".",
+        ",",
+        "..",
+        "+",
+        "-",
+        "e5",
+        "1e",
+        "1e+",
+        "nan",
+        "inf",
+        "NaN",
+        "1e1.",
+        "1e5,",
+        "٣",
+        "\xE2\x88\x92",
+        "\xE2\x88\x92-1",
+        "1_0",
+        "infinity",
+        "0x1p3",
+    };
+    double value;
+    (void)state;
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        assert_int_equal(text_to_typed_number(good[i].text, &value), TEXT_TYPED_NUMBER);
+        assert_true(value == good[i].value);
+    }
+    value = 77;
+    for (size_t i = 0; i < sizeof ambiguous / sizeof ambiguous[0]; i++)
+        assert_int_equal(text_to_typed_number(ambiguous[i], &value), TEXT_TYPED_AMBIGUOUS);
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        assert_int_equal(text_to_typed_number(bad[i], &value), TEXT_TYPED_NO_NUMBER);
+    assert_true(value == 77);
+    char longest[TEXT_NUMBER_LENGTH_MAX + 2];
+    memset(longest, '1', sizeof longest);
+    longest[sizeof longest - 1] = '\0';
+    assert_int_equal(text_to_typed_number(longest, &value), TEXT_TYPED_NO_NUMBER);
+    longest[TEXT_NUMBER_LENGTH_MAX] = '\0';
+    assert_int_equal(text_to_typed_number(longest, &value), TEXT_TYPED_NUMBER);
+}
+
 static void utf8_is_strict(void **state)
 {
     static const char *const good[] = {"a",
@@ -176,6 +251,7 @@ int main(void)
         cmocka_unit_test(shortest_numbers),
         cmocka_unit_test(numbers_survive),
         cmocka_unit_test(only_json_numbers_are_numbers),
+        cmocka_unit_test(numbers_are_read_as_people_type_them),
         cmocka_unit_test(utf8_is_strict),
         cmocka_unit_test(messages_are_printable),
         cmocka_unit_test(dates_are_real),

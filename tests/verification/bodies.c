@@ -99,13 +99,24 @@ void bench_finish(struct bench *b)
     mesh_finish(&b->mesh);
 }
 
-enum ischia_code bench_press(struct bench *b, double d_mm, struct ischia_error *err)
+static void move_bone(struct bench *b, double d_mm)
 {
-    const struct newton_control control = {.force_N = 1, .tolerance = 1e-9, .iterations_max = 200};
-    struct newton_report report;
     b->state.d_mm = d_mm;
     for (int n = 0; n < b->mesh.node_count; n++)
         if (b->mesh.node_flags[n] & (NODE_ON_BONE | NODE_ON_PLATE)) b->state.u_mm[n][2] = -d_mm;
+}
+
+enum ischia_code bench_press(struct bench *b, double d_mm, struct ischia_error *err)
+{
+    const struct newton_control control = {.force_N = 1, .tolerance = 1e-9, .iterations_max = 200};
+    const double before_mm = b->state.d_mm;
+    struct newton_report report;
+    move_bone(b, d_mm);
+    if (!(body_det_F_min(&b->body, (const double(*)[3])b->state.u_mm) > 0)) { /* too far at once */
+        move_bone(b, before_mm);
+        TRY(bench_press(b, (before_mm + d_mm) / 2, err));
+        return bench_press(b, d_mm, err);
+    }
     TRY(newton_minimise(b->newton, &b->state, &control, NULL, NULL, &report, err));
     CHECK(report.reason > 0, err, ISCHIA_E_NUMERIC, "at d = %g mm: %s, residual %g", d_mm,
           ischia_reason_name(report.reason), report.residual);

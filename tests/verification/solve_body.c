@@ -95,7 +95,7 @@ static void problem_materials(const struct problem *p, struct element_material r
     };
     for (int t = 0; t < TISSUE_COUNT; t++) {
         const double mu = MPa_from_kPa(mu_kPa[t]), kappa = mu * p->bulk_ratio;
-        ret[t] = (struct element_material){mu, kappa, kappa};
+        ret[t] = (struct element_material){mu, kappa, kappa, 0};
     }
 }
 

@@ -40,11 +40,12 @@ static const double patch_size[3] = {3, 3, 3};
 
 /* A patch of PATCH^3 elements with its inner nodes moved by up to a quarter of an element, and an
  * assembly in which nothing is held. */
-static void distorted_patch(struct bench *b, double bulk_ratio, double point_share)
+static void distorted_patch(struct bench *b, double bulk_ratio, double point_share,
+                            double corner_over_mu)
 {
     const int m[3] = {PATCH, PATCH, PATCH};
     const struct element_material soft = {0.005, 0.005 * bulk_ratio,
-                                          0.005 * bulk_ratio * point_share};
+                                          0.005 * bulk_ratio * point_share, 0.005 * corner_over_mu};
     const struct element_material material[TISSUE_COUNT] = {soft, soft, soft};
     struct ischia_error err;
     uint32_t seed = 7;
@@ -81,30 +82,46 @@ static double energy_and_force(struct bench *b, double (*ret_force)[3])
     return energy;
 }
 
+/* No force on inner nodes, and some on the others, under u = (F - I) X. */
+static void check_patch(struct bench *b, const double F[3][3])
+{
+    double inner = 0, outer = 0;
+    double(*force)[3] = calloc((size_t)b->mesh.node_count, sizeof *force);
+    assert_non_null(force);
+    deform(b, F);
+    assert_true(energy_and_force(b, force) < HUGE_VAL);
+    for (int n = 0; n < b->mesh.node_count; n++) {
+        const double *X = b->mesh.X_mm[n];
+        const bool is_inner = X[0] > 0 && X[0] < 3 && X[1] > 0 && X[1] < 3 && X[2] > 0 && X[2] < 3;
+        double *largest = is_inner ? &inner : &outer;
+        for (int c = 0; c < 3; c++) *largest = fmax(*largest, fabs(force[n][c]));
+    }
+    assert_true(outer > 1e-4);
+    assert_true(inner < 1e-13 * (1 + outer));
+    free(force);
+}
+
 static void inner_nodes_of_a_patch_carry_no_force(void **state)
 {
     (void)state;
     const double F[3][3] = {{1.2, 0.5, -0.1}, {-0.2, 0.7, 0.3}, {0.1, 0.2, 1.1}};
     for (int share = 0; share <= 2; share++) {
         struct bench b;
-        double inner = 0, outer = 0;
-        distorted_patch(&b, 20, share / 2.0);
-        double(*force)[3] = calloc((size_t)b.mesh.node_count, sizeof *force);
-        assert_non_null(force);
-        deform(&b, F);
-        assert_true(energy_and_force(&b, force) < HUGE_VAL);
-        for (int n = 0; n < b.mesh.node_count; n++) {
-            const double *X = b.mesh.X_mm[n];
-            const bool is_inner =
-                X[0] > 0 && X[0] < 3 && X[1] > 0 && X[1] < 3 && X[2] > 0 && X[2] < 3;
-            double *largest = is_inner ? &inner : &outer;
-            for (int c = 0; c < 3; c++) *largest = fmax(*largest, fabs(force[n][c]));
-        }
-        assert_true(outer > 1e-4);
-        assert_true(inner < 1e-13 * (1 + outer));
-        free(force);
+        distorted_patch(&b, 20, share / 2.0, 0);
+        check_patch(&b, F);
         bench_finish(&b);
     }
+}
+
+/* What resists the collapse of corners knows nothing of a deformation that keeps the volume. */
+static void nor_do_its_corners_where_volume_is_kept(void **state)
+{
+    (void)state;
+    const double F[3][3] = {{1.25, 0.5, -0.1}, {0, 0.5, 0.3}, {0, 0, 1.6}}; /* det F = 1 */
+    struct bench b;
+    distorted_patch(&b, 20, 0.1, 2);
+    check_patch(&b, F);
+    bench_finish(&b);
 }
 
 static void random_state(struct bench *b)
@@ -132,7 +149,7 @@ static void rotations_turn_the_forces_and_keep_the_energy(void **state)
     const double c = cos(0.7), s = sin(0.7);
     const double Q[3][3] = {{c, -s, 0}, {s * c, c * c, -s}, {s * s, s * c, c}};
     struct bench b;
-    distorted_patch(&b, 2000, 0.05);
+    distorted_patch(&b, 2000, 0.05, 0.1);
     double(*force)[3] = calloc(2 * (size_t)b.mesh.node_count, sizeof *force);
     assert_non_null(force);
     double(*turned)[3] = force + b.mesh.node_count;
@@ -156,7 +173,7 @@ static void a_rotated_body_at_rest_is_at_rest(void **state)
     (void)state;
     const double Q[3][3] = {{0, -1, 0}, {0, 0, -1}, {1, 0, 0}};
     struct bench b;
-    distorted_patch(&b, 2000, 0.05);
+    distorted_patch(&b, 2000, 0.05, 0.1);
     rotate_deformed(&b, Q);
     assert_true(fabs(body_energy(&b.body, (const double(*)[3])b.state.u_mm)) < 1e-15);
     bench_finish(&b);
@@ -183,7 +200,7 @@ static void reflections_keep_energy_and_det_F(void **state)
     struct bench b;
     struct body image;
     struct ischia_error err;
-    distorted_patch(&b, 2000, 0.05);
+    distorted_patch(&b, 2000, 0.05, 0.1);
     random_state(&b);
     const double(*u)[3] = (const double(*)[3])b.state.u_mm;
     const double energy = body_energy(&b.body, u);
@@ -380,7 +397,7 @@ static double deflection_ratio(double bulk_ratio, double point_share)
     const double mu = 0.005, force_N = 1e-7;
     const double kappa = mu * bulk_ratio, E = 9 * kappa * mu / (3 * kappa + mu);
     const int m[3] = {4, 4, 48};
-    const struct element_material soft = {mu, kappa, kappa * point_share};
+    const struct element_material soft = {mu, kappa, kappa * point_share, 0};
     const struct element_material material[TISSUE_COUNT] = {soft, soft, soft};
     struct bench b = {0};
     struct ischia_error err;
@@ -416,6 +433,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(inner_nodes_of_a_patch_carry_no_force),
+        cmocka_unit_test(nor_do_its_corners_where_volume_is_kept),
         cmocka_unit_test(rotations_turn_the_forces_and_keep_the_energy),
         cmocka_unit_test(a_rotated_body_at_rest_is_at_rest),
         cmocka_unit_test(reflections_keep_energy_and_det_F),

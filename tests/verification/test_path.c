@@ -32,7 +32,7 @@ static void block(struct bench *b, double bulk_ratio, unsigned top_flags, double
 {
     const int m[3] = {3, 2, 3};
     const double mu = 0.005;
-    const struct element_material soft = {mu, mu * bulk_ratio, 5 * mu};
+    const struct element_material soft = {mu, mu * bulk_ratio, 0.3 * mu, 0};
     const struct element_material material[TISSUE_COUNT] = {soft, soft, soft};
     struct ischia_error err;
     *b = (struct bench){0};
@@ -44,7 +44,8 @@ static struct path_report follow(struct bench *b, double force_N)
 {
     struct path_report report;
     struct ischia_error err;
-    must(path_follow(&b->body, &b->assembly, &b->seat, force_N, NULL, &b->state, &report, &err),
+    must(path_follow(&b->body, &b->assembly, &b->seat, force_N, NULL, NULL, &b->state, &report,
+                     &err),
          &err);
     return report;
 }
@@ -144,7 +145,7 @@ static void local_model(struct bench *b, double friction)
     struct ischia_error err;
     for (int t = 0; t < TISSUE_COUNT; t++) {
         const double mu = MPa_from_kPa(mu_kPa[t]);
-        material[t] = (struct element_material){mu, 2000 * mu, 5 * mu};
+        material[t] = (struct element_material){mu, 2000 * mu, 0.3 * mu, 0.1 * mu};
     }
     memcpy(c.param, row_1R, sizeof row_1R);
     *b = (struct bench){0};

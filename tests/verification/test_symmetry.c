@@ -105,7 +105,7 @@ static void press(struct bench *b)
     const double mu_kPa[TISSUE_COUNT] = {8, 5, 67};
     for (int t = 0; t < TISSUE_COUNT; t++) {
         const double mu = MPa_from_kPa(mu_kPa[t]);
-        material[t] = (struct element_material){mu, 200 * mu, mu};
+        material[t] = (struct element_material){mu, 200 * mu, mu, 0.1 * mu};
     }
     must(bench_init(b, material, friction, &err), &err);
     for (int s = 1; s <= STEPS; s++) {

@@ -87,6 +87,18 @@ function Dimension(props: { s: Scale; from: number; to: number; at: number; text
   );
 }
 
+/* The two radii where they are: R1 of the tube, R2 of the ring's centre line. */
+function Radii(props: { s: Scale; g: Geometry; tip: number }) {
+  const { s, g, tip } = props;
+  const [z_tube, z_ring] = [tip + g.R1, tip + g.R1 + g.R2];
+  return (
+    <g class="dimension">
+      <path d={`M${s.x(0)} ${s.y(z_tube)}H${s.x(-g.R1)}m0 -4v8`} />
+      <path d={`M${s.x(0)} ${s.y(z_ring)}H${s.x(g.R2)}m0 -4v8`} />
+    </g>
+  );
+}
+
 /* What one half shows, on a ground of its own: a large ring may pass under it. */
 function Heading(props: { x: number; text: string; size: string }) {
   return (
@@ -104,6 +116,7 @@ function Labels(props: { s: Scale; g: Geometry; tip: number; top: number }) {
   const interface_z = g.skin + g.eF;
   const bar = nice_bar(s.k);
   const y_seat = px.height - px.bottom;
+  const x_skin = px.width * 0.3;
   return (
     <>
       <Dimension s={s} from={interface_z} to={tip} at={12} text={`eM ${format(g.eM)}`} />
@@ -125,6 +138,11 @@ function Labels(props: { s: Scale; g: Geometry; tip: number; top: number }) {
       <text x="8" y={y_seat + 18}>
         {t('drawing.seat')}
       </text>
+      <path class="leader" d={`M${x_skin - 4} ${y_seat + 14}V${s.y(g.skin / 2)}`} />
+      <text x={x_skin} y={y_seat + 18}>{`${t('drawing.skin')} ${format(g.skin)}`}</text>
+      <text x={s.x(0) + 8} y={s.y(tip + g.R1) + 4}>
+        {t('drawing.bone')}
+      </text>
     </>
   );
 }
@@ -143,6 +161,7 @@ function Picture(props: { g: Geometry }) {
       <path class="bone" d={ring_path(s, tip, g)} />
       <path class="axis" d={`M${s.x(0)} 0V${s.y(0)}`} />
       <rect class="seat" x="0" width={px.width} y={s.y(0)} height="4" />
+      <Radii s={s} g={g} tip={tip} />
       <Labels s={s} g={g} tip={tip} top={top} />
     </>
   );

@@ -16,6 +16,7 @@ export interface FieldProps {
   finding: Finding | null;
   label?: string;
   echo?: string;
+  more_help?: string;
   toggle?: ComponentChildren;
   action?: ComponentChildren;
   on_text: (text: string) => void;
@@ -25,7 +26,7 @@ export interface FieldProps {
 export const field_id = (side: Side, key: string): string => `${side}-${key}`;
 
 export const param_name = (info: ParameterInfo): string =>
-  t_or(`param.${info.key}.name`, info.description);
+  t_or(`param.${info.key}.name`, info.name);
 
 export function Symbol_(props: { of: string }) {
   const symbols: Record<string, [string, string]> = {
@@ -45,7 +46,7 @@ export function Symbol_(props: { of: string }) {
   );
 }
 
-function Help(props: { info: ParameterInfo; id: string; side: Side }) {
+function Help(props: { info: ParameterInfo; more: string; id: string; side: Side }) {
   const [open, set_open] = useState(false);
   const name = param_name(props.info);
   return (
@@ -62,7 +63,7 @@ function Help(props: { info: ParameterInfo; id: string; side: Side }) {
         ?
       </button>
       <span id={props.id} class="help-text" hidden={!open}>
-        {t_or(`param.${props.info.key}.help`, props.info.description)}
+        {`${t_or(`param.${props.info.key}.help`, props.info.description)} ${props.more}`.trim()}
       </span>
     </span>
   );
@@ -101,7 +102,7 @@ export function Field(props: FieldProps) {
       <label for={id}>
         <Symbol_ of={info.key} /> {props.label ?? param_name(info)}
       </label>
-      <Help info={info} id={`${id}-help`} side={side} />
+      <Help info={info} more={props.more_help ?? ''} id={`${id}-help`} side={side} />
       <span class="entry">
         <input
           id={id}

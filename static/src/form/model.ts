@@ -16,6 +16,7 @@ export interface SideEntry {
 export interface Person {
   subject: string;
   measured_at: string;
+  broken_date: boolean; /* begun and not finished: the browser then gives no value at all */
   resolution: string;
 }
 

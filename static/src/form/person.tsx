@@ -31,6 +31,10 @@ function Sample(props: { on_sample: (sample: SamplePerson) => void }) {
   );
 }
 
+function date_of(input: HTMLInputElement): Pick<Person, 'measured_at' | 'broken_date'> {
+  return { measured_at: input.value, broken_date: input.validity.badInput };
+}
+
 export function PersonFields(props: {
   person: Person;
   on_change: (person: Person) => void;
@@ -67,8 +71,19 @@ export function PersonFields(props: {
           name="measured_at"
           type="date"
           value={person.measured_at}
-          onInput={(e) => on_change({ ...person, measured_at: e.currentTarget.value })}
+          aria-invalid={person.broken_date}
+          aria-describedby="measured_at-note"
+          onInput={(e) => on_change({ ...person, ...date_of(e.currentTarget) })}
+          onBlur={(e) => on_change({ ...person, ...date_of(e.currentTarget) })}
         />
+        <span id="measured_at-note" class="reading fault">
+          {person.broken_date && (
+            <>
+              <Shape of="none" />
+              {t('form.measured_at.fault')}
+            </>
+          )}
+        </span>
       </div>
       <Sample on_sample={props.on_sample} />
     </fieldset>

@@ -71,7 +71,7 @@ export function SideForm(props: SideFormProps) {
         value={value_of(entry, key)}
         finding={found}
         {...(by_total ? { label: t('form.total.name'), echo: total_echo(entry) } : {})}
-        toggle={key === 'eM' ? total_toggle : undefined}
+        {...(key === 'eM' ? { more_help: t('form.total.help'), toggle: total_toggle } : {})}
         action={found?.code === 'inconsistent' ? swap_button : undefined}
         on_text={(text) => set_text(key, text)}
         on_typing={(on) => set_typing(on ? key : null)}

@@ -29,7 +29,12 @@ export interface Failure {
   fields: { side: Side; key: string; text: string }[];
 }
 
-const nobody: Person = { subject: '', measured_at: '', resolution: 'standard' };
+const nobody: Person = {
+  subject: '',
+  measured_at: '',
+  broken_date: false,
+  resolution: 'standard',
+};
 const nothing = (): Entries => ({ left: empty_side(), right: empty_side() });
 const no_refusals = (): Refused => ({ left: new Map(), right: new Map() });
 const other: Record<Side, Side> = { left: 'right', right: 'left' };
@@ -130,6 +135,7 @@ export function use_form(parameters: Parameters | null, from: string[]) {
     if (filled.length === 0) set_failure({ text: t('form.error.empty'), fields: [] });
     else if (found.left.size + found.right.size > 0) refuse(found);
     else if (!subject_is_valid(person.subject)) document.getElementById('subject')?.focus();
+    else if (person.broken_date) document.getElementById('measured_at')?.focus();
     else return true;
     return false;
   };

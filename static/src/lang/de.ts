@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-import type { Strings } from '../i18n.js';
+import type { Translation } from '../i18n.js';
 
-export const de: Strings = {
+export const de: Translation = {
   'app.title': 'Ischia',
   'app.tagline': 'Dehnung im Gewebe unter dem Sitzbein, im Sitzen',
   'app.skip': 'Zum Inhalt',
@@ -20,6 +20,7 @@ export const de: Strings = {
   'side.right.short': 'R',
   'side.none.short': '–',
 
+  /* English reads these two of every number from the daemon. */
   'param.R1.name': 'Kleiner Knochenradius',
   'param.R1.help':
     'Krümmungsradius des Sitzbeins an seinem tiefsten Punkt, in der Ebene, in der er am kleinsten ist.',
@@ -27,8 +28,7 @@ export const de: Strings = {
   'param.R2.help':
     'Krümmungsradius des Sitzbeins in der Ebene senkrecht zu R1. Nie kleiner als R1.',
   'param.eM.name': 'Muskeldicke',
-  'param.eM.help':
-    'Dicke des Muskels unter dem Sitzbein, unbelastet. Wenn Sie die Gesamtdicke von Muskel und Fett haben, wählen Sie „gesamt“: eM ist dann gesamt minus eF.',
+  'param.eM.help': 'Dicke des Muskels unter dem Sitzbein, unbelastet.',
   'param.eF.name': 'Fettdicke',
   'param.eF.help': 'Dicke des Fetts unter dem Sitzbein, unbelastet.',
   'param.muM.name': 'Muskelsteifigkeit',
@@ -45,6 +45,7 @@ export const de: Strings = {
   'form.subject.hint': 'Ein Pseudonym, nie ein Name',
   'form.subject.fault': 'Nur Buchstaben ohne Umlaut, Ziffern, „.“, „_“ und „-“, höchstens 64.',
   'form.measured_at': 'Gemessen am',
+  'form.measured_at.fault': 'Kein vollständiges Datum',
   'form.resolution': 'Auflösung',
   'form.resolution.standard': 'Standard',
   'form.resolution.fine': 'Fein (langsamer)',
@@ -58,6 +59,8 @@ export const de: Strings = {
   'form.copy': 'Steifigkeit auf die andere Seite übernehmen',
   'form.total': 'gesamt',
   'form.total.label': 'Gesamtdicke von Muskel und Fett statt eM eingeben, {side}',
+  'form.total.help':
+    'Wenn Sie die Gesamtdicke von Muskel und Fett haben, wählen Sie „gesamt“: eM ist dann gesamt minus eF.',
   'form.total.name': 'Gesamtdicke',
   'form.total.echo': 'eM = {total} − {eF} = {eM} mm',
   'form.total.needs_eF': 'braucht die Fettdicke eF',
@@ -97,6 +100,8 @@ export const de: Strings = {
   'drawing.waiting': 'Wird gezeichnet, sobald R1, R2, eM und eF eingegeben sind',
   'drawing.across': 'quer (R1)',
   'drawing.along': 'längs (R2)',
+  'drawing.bone': 'Knochen',
+  'drawing.skin': 'Haut',
   'drawing.muscle': 'Muskel',
   'drawing.fat': 'Fett',
   'drawing.seat': 'Sitz',
@@ -109,6 +114,7 @@ export const de: Strings = {
   'result.subject': 'Person {subject}',
   'result.measured': 'gemessen {time}',
   'result.computed': 'berechnet {time}',
+  'result.pictures': '{side}: Gewebe und Lastkurve',
   'result.loading': 'Auswertung wird gelesen…',
   'result.lost':
     'Der Server antwortet nicht; es wird weiter versucht. Die Auswertung ist dort gesichert.',
@@ -122,6 +128,9 @@ export const de: Strings = {
   'result.cancelled.text': 'Diese Berechnung wurde angehalten. Es gibt kein Ergebnis.',
   'result.failed': 'Kein Ergebnis',
   'result.failed.text': 'Die Berechnung ist nicht konvergiert; deshalb wird keine Zahl gezeigt.',
+  'result.failed.path': 'Ein Gleichgewicht wurde bis {at} N von {F} N gefunden, darüber nicht.',
+  'result.failed.checks':
+    'Die ganze Kraft wurde erreicht, aber das Ergebnis bestand seine Prüfungen nicht.',
   'result.done': '{side}: {headline}',
   'result.again': 'Ändern und neu berechnen',
   'result.print': 'Bericht drucken',
@@ -177,10 +186,10 @@ export const de: Strings = {
   'curve.crossed': '{force} N',
   'curve.table': 'Lastkurve in Zahlen',
   'curve.col.F': 'Kraft, N',
-  'curve.col.travel': 'Sitzweg, mm',
-  'curve.col.eps': 'ε max (technisch)',
-  'curve.col.shear': 'E Scher (Green–Lagrange)',
-  'curve.col.comp': 'E Komp (Green–Lagrange)',
+  'curve.col.travel': 'Weg, mm',
+  'curve.col.eps': 'ε max',
+  'curve.col.shear': 'E shear',
+  'curve.col.comp': 'E comp',
 
   'picture.title': 'Belastetes Gewebe',
   'picture.section': 'Schnitt',
@@ -276,7 +285,12 @@ export const de: Strings = {
   'view.colour.shear': 'E Scher (Green–Lagrange)',
   'view.colour.comp': 'E Komp (Green–Lagrange)',
   'view.cut': 'Aufgeschnitten',
-  'view.clusters': 'Nur die Bereiche über beiden Schwellen',
+  'view.show': 'Zeigen',
+  'view.show.tissue': 'das Gewebe',
+  'view.show.both': 'Körper über beiden Schwellen',
+  'view.show.shear': 'Körper über der Scherschwelle',
+  'view.show.compression': 'Körper über der Kompressionsschwelle',
+  'view.show.none': 'Kein Muskel liegt darüber.',
   'view.bone': 'Knochen',
   'view.seat': 'Sitz',
   'view.load': 'Last',
@@ -286,6 +300,7 @@ export const de: Strings = {
   'view.reset': 'Ansicht zurücksetzen',
   'view.screenshot': 'Bild sichern',
   'view.threshold': 'Schwelle {value}',
+  'view.above': '{value} und mehr',
 
   'report.title': 'Bericht zur Gewebedehnung',
   'report.inputs': 'Eingaben',
@@ -295,6 +310,7 @@ export const de: Strings = {
   'report.volume': 'Volumen, mm³',
   'report.share': 'des Muskels',
   'report.count': 'Bereiche',
+  'report.largest': 'Größter, unter dem Knochen',
   'report.first_at': 'Zuerst bei',
   'report.section': 'Schnitt, belastet, gefärbt nach Green–Lagrange-Scherung',
   'report.caveats': 'Grenzen dieses Ergebnisses',

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-import type { Strings } from '../i18n.js';
+import type { Translation } from '../i18n.js';
 
-export const fr: Strings = {
+export const fr: Translation = {
   'app.title': 'Ischia',
   'app.tagline': 'Déformation des tissus sous l’ischion, en position assise',
   'app.skip': 'Aller au contenu',
@@ -20,6 +20,7 @@ export const fr: Strings = {
   'side.right.short': 'D',
   'side.none.short': '–',
 
+  /* English reads these two of every number from the daemon. */
   'param.R1.name': 'Petit rayon de l’os',
   'param.R1.help':
     'Rayon de courbure de l’ischion en son point le plus bas, dans le plan où il est le plus petit.',
@@ -27,8 +28,7 @@ export const fr: Strings = {
   'param.R2.help':
     'Rayon de courbure de l’ischion dans le plan perpendiculaire à R1. Jamais inférieur à R1.',
   'param.eM.name': 'Épaisseur de muscle',
-  'param.eM.help':
-    'Épaisseur du muscle sous l’ischion, sans charge. Si vous avez l’épaisseur totale du muscle et de la graisse, cochez « total » : eM est alors le total moins eF.',
+  'param.eM.help': 'Épaisseur du muscle sous l’ischion, sans charge.',
   'param.eF.name': 'Épaisseur de graisse',
   'param.eF.help': 'Épaisseur de la graisse sous l’ischion, sans charge.',
   'param.muM.name': 'Raideur du muscle',
@@ -46,6 +46,7 @@ export const fr: Strings = {
   'form.subject.fault':
     'Lettres sans accent, chiffres, « . », « _ » et « - » seulement, 64 au plus.',
   'form.measured_at': 'Mesuré le',
+  'form.measured_at.fault': 'Date incomplète',
   'form.resolution': 'Résolution',
   'form.resolution.standard': 'Standard',
   'form.resolution.fine': 'Fine (plus lente)',
@@ -59,6 +60,8 @@ export const fr: Strings = {
   'form.copy': 'Copier les raideurs de l’autre côté',
   'form.total': 'total',
   'form.total.label': 'Saisir l’épaisseur totale du muscle et de la graisse au lieu de eM, {side}',
+  'form.total.help':
+    'Si vous avez l’épaisseur totale du muscle et de la graisse, cochez « total » : eM est alors le total moins eF.',
   'form.total.name': 'Épaisseur totale',
   'form.total.echo': 'eM = {total} − {eF} = {eM} mm',
   'form.total.needs_eF': 'il faut l’épaisseur de graisse eF',
@@ -96,6 +99,8 @@ export const fr: Strings = {
   'drawing.waiting': 'Dessinée dès que R1, R2, eM et eF sont saisis',
   'drawing.across': 'en travers (R1)',
   'drawing.along': 'en long (R2)',
+  'drawing.bone': 'os',
+  'drawing.skin': 'peau',
   'drawing.muscle': 'muscle',
   'drawing.fat': 'graisse',
   'drawing.seat': 'assise',
@@ -108,6 +113,7 @@ export const fr: Strings = {
   'result.subject': 'Sujet {subject}',
   'result.measured': 'mesuré {time}',
   'result.computed': 'calculé {time}',
+  'result.pictures': '{side} : tissus et courbe de charge',
   'result.loading': 'Lecture de l’évaluation…',
   'result.lost': 'Le serveur ne répond pas ; nouvel essai en cours. L’évaluation y est conservée.',
   'result.not_found': 'Cette évaluation n’existe pas.',
@@ -120,6 +126,9 @@ export const fr: Strings = {
   'result.cancelled.text': 'Ce calcul a été arrêté. Il n’y a pas de résultat.',
   'result.failed': 'Pas de résultat',
   'result.failed.text': 'Le calcul n’a pas convergé ; aucun nombre n’est donc montré.',
+  'result.failed.path': 'L’équilibre a été trouvé jusqu’à {at} N sur {F} N, pas au-delà.',
+  'result.failed.checks':
+    'La force entière a été atteinte, mais le résultat n’a pas passé ses contrôles.',
   'result.done': '{side} : {headline}',
   'result.again': 'Modifier et recalculer',
   'result.print': 'Imprimer le rapport',
@@ -175,10 +184,10 @@ export const fr: Strings = {
   'curve.crossed': '{force} N',
   'curve.table': 'Courbe de charge en nombres',
   'curve.col.F': 'Force, N',
-  'curve.col.travel': 'Course de l’assise, mm',
-  'curve.col.eps': 'ε max (ingénieur)',
-  'curve.col.shear': 'E cis. (Green–Lagrange)',
-  'curve.col.comp': 'E comp. (Green–Lagrange)',
+  'curve.col.travel': 'Course, mm',
+  'curve.col.eps': 'ε max',
+  'curve.col.shear': 'E shear',
+  'curve.col.comp': 'E comp',
 
   'picture.title': 'Tissu chargé',
   'picture.section': 'Coupe',
@@ -274,7 +283,12 @@ export const fr: Strings = {
   'view.colour.shear': 'E cis. (Green–Lagrange)',
   'view.colour.comp': 'E comp. (Green–Lagrange)',
   'view.cut': 'Ouvert',
-  'view.clusters': 'Seulement les amas au-dessus des deux seuils',
+  'view.show': 'Montrer',
+  'view.show.tissue': 'les tissus',
+  'view.show.both': 'les corps au-delà des deux seuils',
+  'view.show.shear': 'les corps au-delà du seuil de cisaillement',
+  'view.show.compression': 'les corps au-delà du seuil de compression',
+  'view.show.none': 'Aucune partie du muscle ne le dépasse.',
   'view.bone': 'Os',
   'view.seat': 'Assise',
   'view.load': 'Charge',
@@ -284,6 +298,7 @@ export const fr: Strings = {
   'view.reset': 'Vue initiale',
   'view.screenshot': 'Enregistrer l’image',
   'view.threshold': 'seuil {value}',
+  'view.above': '{value} et plus',
 
   'report.title': 'Rapport de déformation des tissus',
   'report.inputs': 'Données',
@@ -293,6 +308,7 @@ export const fr: Strings = {
   'report.volume': 'Volume, mm³',
   'report.share': 'du muscle',
   'report.count': 'Amas',
+  'report.largest': 'Le plus grand, sous l’os',
   'report.first_at': 'Dès',
   'report.section': 'Coupe, chargée, colorée selon le cisaillement de Green–Lagrange',
   'report.caveats': 'Limites de ce résultat',

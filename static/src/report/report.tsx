@@ -7,7 +7,7 @@ import { get_version, section_path, type Parameters } from '../api.js';
 import { format, format_fixed, format_percent, format_time, t } from '../i18n.js';
 import { param_name, Symbol_ } from '../form/field.js';
 import { general_caveats, warning_text } from '../result/caveats.js';
-import { share_of_muscle, type Finished } from '../result/quantities.js';
+import { share_of_muscle, tip_height, type Finished } from '../result/quantities.js';
 import type { ClusterSet } from '../types.js';
 import { column_names, Shape } from '../ui.js';
 
@@ -77,8 +77,13 @@ function Strain(props: { of: Finished }) {
   );
 }
 
-function Clusters(props: { of: Finished }) {
+function Clusters(props: { of: Finished; skin_mm: number }) {
   const { result, parameters } = props.of;
+  const tip = tip_height(props.of, props.skin_mm);
+  const largest = ({ largest: body }: ClusterSet): string =>
+    body
+      ? `${format_fixed(body.volume_mm3, 0)} mm³, ${format_fixed(tip - body.centroid_mm[2], 1)} mm`
+      : '–';
   const { clusters, threshold_force_N: force } = result;
   const first = (N: number | null | undefined): string => {
     if (N === undefined) return '';
@@ -108,6 +113,9 @@ function Clusters(props: { of: Finished }) {
           <th scope="col" class="n">
             {t('report.count')}
           </th>
+          <th scope="col" class="n">
+            {t('report.largest')}
+          </th>
           <th
             scope="col"
             class="n"
@@ -123,6 +131,7 @@ function Clusters(props: { of: Finished }) {
               <td class="n">{format_fixed(set.volume_mm3, 0)}</td>
               <td class="n">{share === null ? '–' : format_percent(share)}</td>
               <td class="n">{set.count}</td>
+              <td class="n">{largest(set)}</td>
               <td class="n">{first(N)}</td>
             </tr>
           );
@@ -160,7 +169,7 @@ function Report(props: { of: Finished; name: string; parameters: Parameters; ver
         <Inputs of={of} parameters={parameters} />
         <Strain of={of} />
       </div>
-      <Clusters of={of} />
+      <Clusters of={of} skin_mm={parameters.skin_thickness_mm} />
       <figure>
         <figcaption>{t('report.section')}</figcaption>
         <img src={section_path(of.id)} alt="" />

@@ -4,14 +4,15 @@
 import { useEffect, useState } from 'preact/hooks';
 import { list } from '../api.js';
 import { has_ended } from '../follow.js';
-import { format_fixed, format_time, t } from '../i18n.js';
+import { format, format_fixed, format_time, t } from '../i18n.js';
 import { result_address } from '../router.js';
-import type { Assessment } from '../types.js';
+import type { Assessment, Side } from '../types.js';
 import { Link, Outcome, side_letter, side_name } from '../ui.js';
-import { ticks } from './axis.js';
+import { axis_of } from './axis.js';
 import { finished, type Finished } from './quantities.js';
 
 const size = { width: 460, height: 120, left: 36, right: 20, top: 12, foot: 22 };
+const inset = 22;
 const day_ms = 24 * 3600 * 1000; /* two sides of one visit make no history */
 const time_of = (d: Assessment): string => d.measured_at ?? d.created_at;
 
@@ -32,16 +33,19 @@ function use_history(subject: string | null, ended: number): Assessment[] | null
   return items;
 }
 
+/* Left and right of one visit stand beside each other, so that neither hides the other. */
+const aside = (d: Finished): number => (d.side === 'left' ? -7 : d.side === 'right' ? 7 : 0);
+
 function Mark(props: { x: number; y: number; of: Finished; current: boolean }) {
   const { x, y, of, current } = props;
-  const shape =
-    of.side === 'right'
-      ? `M${x - 5} ${y - 5}h10v10h-10z`
-      : `M${x - 5} ${y}a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z`;
+  const right = of.side === 'right';
+  const shape = right
+    ? `M${x - 5} ${y - 5}h10v10h-10z`
+    : `M${x - 5} ${y}a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z`;
   return (
     <g class={`mark ${of.side ?? ''} ${current ? 'current' : ''}`}>
       <path d={shape} />
-      <text x={x} y={y - 8} text-anchor="middle">
+      <text x={x + (right ? 8 : -8)} y={y + 4} text-anchor={right ? 'start' : 'end'}>
         {side_letter(of.side)}
       </text>
     </g>
@@ -53,11 +57,25 @@ function Chart(props: { items: Finished[]; current: string[] }) {
   const times = items.map((d) => Date.parse(time_of(d)));
   const [first, last] = [Math.min(...times), Math.max(...times)];
   if (items.length < 2 || last - first < day_ms) return null;
-  const max = Math.max(...items.map((d) => d.result.strain.eps_max)) * 1.15;
+  const { from, to, marks } = axis_of(
+    items.map((d) => d.result.strain.eps_max),
+    3,
+  );
   const bottom = size.height - size.foot;
-  const x = (time: number): number =>
-    size.left + 10 + ((time - first) / (last - first)) * (size.width - size.left - size.right - 20);
-  const y = (v: number): number => bottom - (v / max) * (bottom - size.top);
+  const room = size.width - size.left - size.right - 2 * inset;
+  const x = (time: number): number => size.left + inset + ((time - first) / (last - first)) * room;
+  const y = (v: number): number => bottom - ((v - from) / (to - from)) * (bottom - size.top);
+  const points = items.map((of) => ({
+    of,
+    x: x(Date.parse(time_of(of))) + aside(of),
+    y: y(of.result.strain.eps_max),
+  }));
+  const line_of = (side: Side): string =>
+    points
+      .filter((p) => p.of.side === side)
+      .sort((a, b) => a.x - b.x)
+      .map((p, i) => `${i ? 'L' : 'M'}${p.x} ${p.y}`)
+      .join('');
   return (
     <svg
       class="history"
@@ -65,22 +83,18 @@ function Chart(props: { items: Finished[]; current: string[] }) {
       role="img"
       aria-label={t('history.alt')}
     >
-      {ticks(max, 3).map((v) => (
+      {marks.map((v) => (
         <g key={v}>
           <path class="grid" d={`M${size.left} ${y(v)}H${size.width - size.right}`} />
           <text class="tick" x={size.left - 5} y={y(v) + 4} text-anchor="end">
-            {format_fixed(v, 1)}
+            {format(v)}
           </text>
         </g>
       ))}
-      {items.map((d, i) => (
-        <Mark
-          key={d.id}
-          x={x(times[i] ?? 0)}
-          y={y(d.result.strain.eps_max)}
-          of={d}
-          current={current.includes(d.id)}
-        />
+      <path class="line left" d={line_of('left')} />
+      <path class="line right" d={line_of('right')} />
+      {points.map((p) => (
+        <Mark key={p.of.id} {...p} current={current.includes(p.of.id)} />
       ))}
       <text class="tick" x={size.left} y={size.height - 4}>
         {format_time(new Date(first).toISOString().slice(0, 10))}

@@ -99,8 +99,18 @@ function Table(props: { points: LoadPoint[] }) {
         <table class="numbers small">
           <thead>
             <tr>
-              <th scope="col">{t('curve.col.F')}</th>
-              <th scope="col">{t('curve.col.travel')}</th>
+              <th scope="col" rowSpan={2}>
+                {t('curve.col.F')}
+              </th>
+              <th scope="col" rowSpan={2}>
+                {t('curve.col.travel')}
+              </th>
+              <th scope="col">{t('report.engineering')}</th>
+              <th scope="colgroup" colSpan={2}>
+                {t('report.green_lagrange')}
+              </th>
+            </tr>
+            <tr>
               <th scope="col">{t('curve.col.eps')}</th>
               <th scope="col">{t('curve.col.shear')}</th>
               <th scope="col">{t('curve.col.comp')}</th>

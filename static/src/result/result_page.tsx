@@ -93,15 +93,24 @@ function SideCard(props: {
       )}
       {busy && <Running state={state} name={name} on_cancelled={props.on_cancelled} />}
       {document && has_ended(document) && !done && <NoResult of={document} />}
-      {done && (
-        <>
-          <Glance of={done} skin_mm={props.skin_mm} />
-          <div class="figures">
-            <Picture of={done} side={name} />
-            <LoadCurve of={done} side={name} />
-          </div>
-        </>
-      )}
+      {done && <Glance of={done} skin_mm={props.skin_mm} />}
+    </section>
+  );
+}
+
+/* What stands behind the answer; an empty place keeps left and right in their columns. */
+function FigureCard(props: { of: Assessment | null; name: string }) {
+  const { of, name } = props;
+  const done = of ? finished([of])[0] : undefined;
+  if (!done) return <div />;
+  const heading = t('result.pictures', { side: name });
+  return (
+    <section class={`card ${done.side ?? ''}`} aria-label={heading}>
+      <h2>{heading}</h2>
+      <div class="figures">
+        <Picture of={done} side={name} />
+        <LoadCurve of={done} side={name} />
+      </div>
     </section>
   );
 }
@@ -190,6 +199,13 @@ export function ResultPage(props: { ids: string[] }) {
         ))}
       </div>
       {done.length > 0 && <Caveats documents={done} inputs={inputs} />}
+      {done.length > 0 && (
+        <div class={`cards n${ids.length}`}>
+          {states.map((state, i) => (
+            <FigureCard key={ids[i]} of={state.document} name={names[i] ?? ''} />
+          ))}
+        </div>
+      )}
       <div class="lower">
         {done.length > 0 && <Numbers documents={done} inputs={inputs} />}
         <div>

@@ -6,7 +6,7 @@ import { format, format_fixed, t, type Key } from '../i18n.js';
 import { comparable_sides, type ReferenceSide } from '../reference.js';
 import type { Result } from '../types.js';
 import { column_letters, column_names, side_letter } from '../ui.js';
-import { ticks } from './axis.js';
+import { axis_of } from './axis.js';
 import type { Finished } from './quantities.js';
 
 interface Metric {
@@ -43,13 +43,17 @@ const line_y = 40;
 
 function Strip(props: { metric: Metric; reference: number[]; ours: number[]; letters: string[] }) {
   const { metric, reference, ours, letters } = props;
-  const max = Math.max(...reference, ...ours) * 1.04 || 1;
-  const x = (v: number): number => margin + (v / max) * (width - 2 * margin);
+  const { from, to, marks } = axis_of([...reference, ...ours], 5);
+  const x = (v: number): number => margin + ((v - from) / (to - from)) * (width - 2 * margin);
+  const highest = ours.indexOf(
+    Math.max(...ours),
+  ); /* its letter goes to the right, so that two close
+                                                      marks do not write over each other */
   const label = t('strip.alt', { metric: t(metric.key), n: reference.length });
   return (
-    <svg class="strip" viewBox={`0 0 ${width} 66`} role="img" aria-label={label}>
+    <svg class="strip" viewBox={`0 0 ${width} 72`} role="img" aria-label={label}>
       <path class="axis" d={`M${margin} ${line_y}H${width - margin}`} />
-      {ticks(max, 5).map((v) => (
+      {marks.map((v) => (
         <g key={v}>
           <path class="axis" d={`M${x(v)} ${line_y + 8}v4`} />
           <text class="tick" x={x(v)} y={line_y + 24} text-anchor="middle">
@@ -63,7 +67,12 @@ function Strip(props: { metric: Metric; reference: number[]; ours: number[]; let
       {ours.map((v, i) => (
         <g key={i} class={`ours n${i}`}>
           <path d={`M${x(v)} ${line_y - 6}l-6 -10h12z`} />
-          <text x={x(v)} y={line_y - 20} text-anchor={i ? 'start' : 'end'} dx={i ? 1 : -1}>
+          <text
+            x={x(v)}
+            y={line_y - 20}
+            text-anchor={i === highest ? 'start' : 'end'}
+            dx={i === highest ? 1 : -1}
+          >
             {letters[i]}
           </text>
         </g>
@@ -97,7 +106,7 @@ function Row(props: { metric: Metric; sides: ReferenceSide[]; documents: Finishe
       <table class="numbers small">
         <thead>
           <tr>
-            <td />
+            <th scope="col">{t('list.side')}</th>
             <th scope="col">{t(metric.key)}</th>
             <th scope="col">{t('strip.rank')}</th>
           </tr>

@@ -2,7 +2,7 @@
 //
 // A side that has no result, yet or ever: where it stands, why it ended.
 import { cancel } from '../api.js';
-import { t } from '../i18n.js';
+import { format, t } from '../i18n.js';
 import type { Followed } from '../follow.js';
 import type { Assessment } from '../types.js';
 import { Shape } from '../ui.js';
@@ -34,9 +34,19 @@ export function Running(props: { state: Followed; name: string; on_cancelled: ()
   );
 }
 
+/* Why a load path ended, in the reader's language; '' for other reasons, which the daemon words. */
+function end_of_path(of: Assessment): string {
+  const { reason, last_converged_fraction: fraction } = of.problem ?? {};
+  const F = of.parameters['F'];
+  if (reason === 'diverged_checks') return t('result.failed.checks');
+  if (!reason || fraction === undefined || F === undefined) return '';
+  return t('result.failed.path', { at: format(fraction * F, 3), F });
+}
+
 export function NoResult(props: { of: Assessment }) {
   const { status, problem } = props.of;
   const cancelled = status === 'cancelled';
+  const reason = end_of_path(props.of);
   return (
     <div class="glance no-result">
       <p class="verdict">
@@ -44,12 +54,16 @@ export function NoResult(props: { of: Assessment }) {
         <strong>{t(cancelled ? 'result.cancelled' : 'result.failed')}</strong>
       </p>
       <p>{t(cancelled ? 'result.cancelled.text' : 'result.failed.text')}</p>
-      {!cancelled && problem?.title && (
+      {!cancelled && reason && (
         <p>
-          <strong>{problem.title}</strong>
+          <strong>{reason}</strong>
         </p>
       )}
-      {!cancelled && problem?.detail && <p>{problem.detail}</p>}
+      {!cancelled && problem && (
+        <p class="hint" lang="en">
+          {[problem.title, problem.detail].filter(Boolean).join(': ')}
+        </p>
+      )}
     </div>
   );
 }

@@ -7,11 +7,18 @@ export interface ColourStop {
   rgb: readonly [number, number, number];
 }
 
+export type Criterion = 'both' | 'shear' | 'compression';
+
+export interface Thresholds {
+  shear: number;
+  compression: number;
+}
+
 export interface SceneState {
   colour: 'E_shear' | 'E_comp' | null; /* null: plain tissue */
   stops: ColourStop[];
   cut: boolean;
-  only_clusters: boolean;
+  bodies: Criterion | null; /* only the muscle over it, as solid bodies; null: the tissue */
   bone: boolean;
   seat: boolean;
   scale: number; /* of the displacement: 1 as solved, 0 unloaded */
@@ -28,5 +35,5 @@ export interface Scene {
 
 export interface SceneModule {
   /* Throws an Error that says why when the field cannot be read or drawn. */
-  create_scene(container: HTMLElement, vtu: string): Scene;
+  create_scene(container: HTMLElement, vtu: string, thresholds: Thresholds): Scene;
 }

@@ -9,7 +9,7 @@ import vtkActor from '@kitware/vtk.js/Rendering/Core/Actor';
 import vtkColorTransferFunction from '@kitware/vtk.js/Rendering/Core/ColorTransferFunction';
 import vtkMapper from '@kitware/vtk.js/Rendering/Core/Mapper';
 import vtkGenericRenderWindow from '@kitware/vtk.js/Rendering/Misc/GenericRenderWindow';
-import type { ColourStop, Scene, SceneState } from './contract.js';
+import type { ColourStop, Criterion, Scene, SceneState, Thresholds } from './contract.js';
 import {
   boundary_faces,
   bone_faces,
@@ -34,7 +34,7 @@ const colours: Record<'muscle' | 'fat' | 'skin' | 'cluster' | 'bone' | 'seat', R
   seat: [0.74, 0.78, 0.82],
 };
 const bone_rise_mm = 6; /* how far the bone is shown above the top of the tissue */
-const seat_margin_mm = 12;
+const seat_margin_mm = 6;
 
 interface Body {
   actor: vtkActor;
@@ -105,15 +105,27 @@ function transfer(stops: ColourStop[]): vtkColorTransferFunction {
   return map;
 }
 
+/* The muscle over each criterion; over both: the clusters that the daemon found. */
+function bodies_over(field: Field, thresholds: Thresholds): Record<Criterion, Faces> {
+  const muscle_over = (values: Float64Array, threshold: number): Faces =>
+    boundary_faces(field, (e) => field.tissue[e] === 0 && (values[e] as number) > threshold);
+  return {
+    both: boundary_faces(field, (e) => (field.cluster[e] as number) > 0),
+    shear: muscle_over(field.E_shear, thresholds.shear),
+    compression: muscle_over(field.E_comp, thresholds.compression),
+  };
+}
+
 class Tissues implements Scene {
   private readonly field: Field;
   private readonly motion: Motion;
   private readonly window: vtkGenericRenderWindow;
-  private readonly faces: Record<'muscle' | 'fat' | 'skin' | 'cluster' | 'bone', Faces>;
+  private readonly faces: Record<'muscle' | 'fat' | 'skin' | 'bone', Faces>;
+  private readonly over: Record<Criterion, Faces>;
   private readonly bodies: Record<'muscle' | 'fat' | 'skin' | 'cluster' | 'bone' | 'seat', Body>;
   private readonly resize: ResizeObserver;
 
-  constructor(container: HTMLElement, vtu: string) {
+  constructor(container: HTMLElement, vtu: string, thresholds: Thresholds) {
     const field = read_vtu(vtu);
     this.field = field;
     this.motion = motion_of(field);
@@ -124,9 +136,9 @@ class Tissues implements Scene {
       muscle,
       fat: tissue(1),
       skin: tissue(2),
-      cluster: boundary_faces(field, (e) => (field.cluster[e] as number) > 0),
       bone: bone_faces(field, muscle, this.motion.tip),
     };
+    this.over = bodies_over(field, thresholds);
     this.window = vtkGenericRenderWindow.newInstance({
       background: [1, 1, 1],
       listenWindowResize: false,
@@ -156,14 +168,14 @@ class Tissues implements Scene {
         place(faces, this.motion, state.scale, shown),
         cells(faces, shown),
       );
-      this.bodies[name].actor.getProperty().setOpacity(state.only_clusters ? 0.12 : 1);
+      this.bodies[name].actor.getProperty().setOpacity(state.bodies ? 0.12 : 1);
     }
-    this.place_whole(cluster, this.faces.cluster, state.scale);
+    this.place_whole(cluster, this.over[state.bodies ?? 'both'], state.scale);
     this.place_bone(state.scale);
     this.place_seat(state.scale);
     this.colour_muscle(state, shown.length);
-    muscle.mapper.setScalarVisibility(state.colour !== null && !state.only_clusters);
-    cluster.actor.setVisibility(state.only_clusters);
+    muscle.mapper.setScalarVisibility(state.colour !== null && !state.bodies);
+    cluster.actor.setVisibility(state.bodies !== null);
     bone.actor.setVisibility(state.bone);
     seat.actor.setVisibility(state.seat);
     fat.actor.setVisibility(true);
@@ -178,7 +190,7 @@ class Tissues implements Scene {
     camera.setPosition(1, -1.25, 0.6);
     camera.setViewUp(0, 0, 1);
     this.window.getRenderer().resetCamera();
-    camera.zoom(1.35);
+    camera.zoom(1.6);
     this.render();
   }
 
@@ -257,7 +269,6 @@ class Tissues implements Scene {
   }
 }
 
-export function create_scene(container: HTMLElement, vtu: string): Scene {
-  const scene = new Tissues(container, vtu);
-  return scene;
+export function create_scene(container: HTMLElement, vtu: string, thresholds: Thresholds): Scene {
+  return new Tissues(container, vtu, thresholds);
 }

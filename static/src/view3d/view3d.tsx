@@ -8,7 +8,7 @@ import type { Finished } from '../result/quantities.js';
 import type { LoadPoint } from '../types.js';
 import { save_file } from '../ui.js';
 import { colour_stops, css_colour } from './colours.js';
-import type { Scene, SceneModule, SceneState } from './contract.js';
+import type { Criterion, Scene, SceneModule, SceneState, Thresholds } from './contract.js';
 
 const bundle = '/assets/view3d.js';
 const turn_degrees = 8;
@@ -16,7 +16,7 @@ const turn_degrees = 8;
 interface Controls {
   colour: 'E_shear' | 'E_comp';
   cut: boolean;
-  only_clusters: boolean;
+  bodies: Criterion | null;
   bone: boolean;
   seat: boolean;
   step: number; /* index into the load path */
@@ -39,11 +39,15 @@ function path_of(of: Finished): LoadPoint[] {
   return [start, ...of.result.load_curve.filter((p) => p.F_N > 0)];
 }
 
-function scale_range(of: Finished, colour: Controls['colour']): { threshold: number; max: number } {
+function thresholds_of(of: Finished): Thresholds {
   const { shear, compression } = of.result.clusters;
-  if (colour === 'E_comp') return { threshold: compression.threshold ?? 0.45, max: 0.5 };
-  const threshold = shear.threshold ?? 0.75;
-  return { threshold, max: 2 * threshold };
+  return { shear: shear.threshold ?? 0.75, compression: compression.threshold ?? 0.45 };
+}
+
+/* The same scale for every side, so that two can be compared; shear ends where the section's does. */
+function scale_range(of: Finished, colour: Controls['colour']): { threshold: number; max: number } {
+  const { shear, compression } = thresholds_of(of);
+  return colour === 'E_comp' ? { threshold: compression, max: 0.5 } : { threshold: shear, max: 2 };
 }
 
 function scene_state(of: Finished, c: Controls): SceneState {
@@ -56,20 +60,20 @@ function scene_state(of: Finished, c: Controls): SceneState {
     colour: full ? c.colour : null,
     stops: colour_stops(threshold, max),
     cut: c.cut,
-    only_clusters: c.only_clusters && full,
+    bodies: full ? c.bodies : null,
     bone: c.bone,
     seat: c.seat,
     scale: last > 0 ? travel / last : 1,
   };
 }
 
-async function load(container: HTMLElement, id: string): Promise<Scene> {
+async function load(container: HTMLElement, of: Finished): Promise<Scene> {
   const [module, response] = await Promise.all([
     import(/* @vite-ignore */ bundle) as Promise<SceneModule>,
-    fetch(field_path(id)),
+    fetch(field_path(of.id)),
   ]);
   if (!response.ok) throw new Error(`HTTP ${response.status}`);
-  return module.create_scene(container, await response.text());
+  return module.create_scene(container, await response.text(), thresholds_of(of));
 }
 
 type Stage = { is: 'loading' | 'ready' | 'no_webgl' } | { is: 'failed'; detail: string };
@@ -81,7 +85,7 @@ function use_scene(of: Finished, state: SceneState) {
   useEffect(() => {
     if (!has_webgl()) return set_stage({ is: 'no_webgl' });
     let wanted = true;
-    load(container.current as HTMLElement, of.id).then(
+    load(container.current as HTMLElement, of).then(
       (made) => {
         if (!wanted) return made.dispose();
         scene.current = made;
@@ -124,7 +128,7 @@ function Legend(props: { of: Finished; colour: Controls['colour'] }) {
         {t('view.threshold', { value: threshold })}
       </text>
       <text x="290" y="28" text-anchor="end">
-        {format(max)}
+        {max < 1 ? format(max) : t('view.above', { value: max })}
       </text>
     </svg>
   );
@@ -140,6 +144,38 @@ function Check(props: { label: string; on: boolean; change: (on: boolean) => voi
       />
       {props.label}
     </label>
+  );
+}
+
+const criteria: readonly Criterion[] = ['both', 'shear', 'compression'];
+
+function Bodies(props: {
+  of: Finished;
+  shown: Criterion | null;
+  change: (shown: Criterion | null) => void;
+}) {
+  const { shown } = props;
+  const nothing = shown !== null && props.of.result.clusters[shown].volume_mm3 <= 0;
+  const id = `show-${props.of.id}`;
+  return (
+    <>
+      <label for={id}>{t('view.show')}</label>
+      <select
+        id={id}
+        value={shown ?? ''}
+        onChange={(e) => props.change((e.currentTarget.value || null) as Criterion | null)}
+      >
+        <option value="">{t('view.show.tissue')}</option>
+        {criteria.map((name) => (
+          <option key={name} value={name}>
+            {t(`view.show.${name}`)}
+          </option>
+        ))}
+      </select>
+      <span role="status" class="hint">
+        {nothing && t('view.show.none')}
+      </span>
+    </>
   );
 }
 
@@ -192,7 +228,7 @@ export function View3d(props: { of: Finished; side: string; on_section: () => vo
   const [c, set] = useState<Controls>({
     colour: 'E_shear',
     cut: true,
-    only_clusters: false,
+    bodies: null,
     bone: true,
     seat: true,
     step: path_of(of).length - 1,
@@ -249,11 +285,7 @@ export function View3d(props: { of: Finished; side: string; on_section: () => vo
           </select>
         </label>
         <Check label={t('view.cut')} on={c.cut} change={(cut) => change({ cut })} />
-        <Check
-          label={t('view.clusters')}
-          on={c.only_clusters}
-          change={(only_clusters) => change({ only_clusters })}
-        />
+        <Bodies of={of} shown={c.bodies} change={(bodies) => change({ bodies })} />
         <Check label={t('view.bone')} on={c.bone} change={(bone) => change({ bone })} />
         <Check label={t('view.seat')} on={c.seat} change={(seat) => change({ seat })} />
         <button type="button" onClick={() => scene.current?.reset_view()}>
