@@ -129,6 +129,25 @@ static bool allocate(struct assembly *a, const struct mesh *mesh)
     return a->equation && a->scatter && a->diagonal && a->tangential;
 }
 
+/* Puts the equations into the order in which their factor is cheap. */
+static enum ischia_code reorder(struct assembly *a, const struct mesh *mesh,
+                                const struct pattern *pattern, struct ischia_error *err)
+{
+    int *order = malloc(sizeof *order * (size_t)a->n), *rank = malloc(sizeof *rank * (size_t)a->n);
+    enum ischia_code code;
+    if (order != NULL && rank != NULL)
+        code = linear_order(a->n, pattern->start, pattern->row, order, err);
+    else
+        code = FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the equations");
+    for (int k = 0; code == ISCHIA_OK && k < a->n; k++) rank[order[k]] = k;
+    for (int n = 0; code == ISCHIA_OK && n < mesh->node_count; n++)
+        for (int c = 0; c < 3; c++)
+            if (a->equation[n][c] >= 0) a->equation[n][c] = rank[a->equation[n][c]];
+    free(order);
+    free(rank);
+    return code;
+}
+
 /* What is half made when it fails is the caller's to finish. */
 static enum ischia_code build(struct assembly *a, const struct mesh *mesh, struct pattern *pattern,
                               struct ischia_error *err)
@@ -136,6 +155,9 @@ static enum ischia_code build(struct assembly *a, const struct mesh *mesh, struc
     static const char no_memory[] = "not enough memory for the equations";
     CHECK(allocate(a, mesh), err, ISCHIA_E_MEMORY, "%s", no_memory);
     number_equations(a, mesh);
+    CHECK(pattern_init(pattern, a, mesh), err, ISCHIA_E_MEMORY, "%s", no_memory);
+    TRY(reorder(a, mesh, pattern, err));
+    pattern_finish(pattern);
     CHECK(pattern_init(pattern, a, mesh), err, ISCHIA_E_MEMORY, "%s", no_memory);
     map_entries(a, mesh, pattern);
     return linear_create(&a->linear, a->n, pattern->start, pattern->row, err);

@@ -21,51 +21,75 @@ struct linear {
     cholmod_dense *solution, *work_y, *work_e; /* reused from solve to solve */
 };
 
-static void common_init(cholmod_common *common)
+static void common_init(cholmod_common *common, int ordering)
 {
     cholmod_start(common);
     common->supernodal = CHOLMOD_SUPERNODAL;
     common->final_ll = 1;
     common->print = 0;
     common->nmethods = 1;
-    common->method[0].ordering = CHOLMOD_GIVEN;
-    common->postorder = 1;
+    common->method[0].ordering = ordering;
+    common->postorder = ordering == CHOLMOD_GIVEN;
+    /* Supernodes merged a little further than by default: docs/decisions/0008. */
+    memcpy(common->nrelax, (size_t[]){8, 24, 64}, sizeof common->nrelax);
+}
+
+static cholmod_sparse *pattern_of(int n, const int *start, const int *row, cholmod_common *common)
+{
+    const size_t nnz = (size_t)start[n];
+    cholmod_sparse *A =
+        cholmod_allocate_sparse((size_t)n, (size_t)n, nnz, 1, 1, -1, CHOLMOD_REAL, common);
+    if (A == NULL) return NULL;
+    memcpy(A->p, start, sizeof(int) * (size_t)(n + 1));
+    memcpy(A->i, row, sizeof(int) * nnz);
+    memset(A->x, 0, sizeof(double) * nnz);
+    return A;
 }
 
 /*
- * The analysis with METIS' ordering. METIS is called apart from it, because CHOLMOD ignores METIS'
- * failures: without memory it would go on with whatever the permutation held. It is filled with
- * what is no permutation instead, and must be one afterwards. Nor may the analysis take up another
- * ordering when memory fails it: the solution's last bits would differ.
+ * METIS is called apart from the analysis, because CHOLMOD ignores METIS' failures: without memory
+ * it would go on with whatever the permutation held. It is filled with what is no permutation
+ * instead, and must be one afterwards.
  */
-static void analyse(struct linear *l)
+static bool order_pattern(cholmod_sparse *A, int *order, cholmod_common *common)
 {
-    cholmod_common *common = &l->common;
-    const size_t n = l->A->ncol;
-    int *order = malloc(n * sizeof *order);
-    common->status = CHOLMOD_OUT_OF_MEMORY;
-    if (order == NULL) return;
+    const size_t n = A->ncol;
     memset(order, 0xff, n * sizeof *order);
-    const bool ordered =
-        cholmod_metis(l->A, NULL, 0, 0, order, common) && cholmod_check_perm(order, n, n, common);
-    if (ordered) l->L = cholmod_analyze_p(l->A, order, NULL, 0, common);
-    const bool kept = l->L != NULL && l->L->ordering == CHOLMOD_GIVEN;
-    if (!kept && (common->status == CHOLMOD_OK || common->status == CHOLMOD_INVALID))
-        common->status = CHOLMOD_OUT_OF_MEMORY;
+    if (!cholmod_metis(A, NULL, 0, 0, order, common) || !cholmod_check_perm(order, n, n, common))
+        return false;
+    cholmod_factor *L = cholmod_analyze_p(A, order, NULL, 0, common);
+    const bool kept = L != NULL && L->ordering == CHOLMOD_GIVEN;
+    if (kept) memcpy(order, L->Perm, n * sizeof *order);
+    cholmod_free_factor(&L, common);
+    return kept && common->status == CHOLMOD_OK;
+}
+
+/* Nor may an analysis take up another ordering when memory fails it: the solution's last bits would
+ * differ. All that can go wrong with a pattern that is in order is memory. */
+enum ischia_code linear_order(int n, const int *start, const int *row, int *ret_order,
+                              struct ischia_error *err)
+{
+    cholmod_common common;
+    int *order = malloc((size_t)n * sizeof *order);
+    CHECK(order != NULL, err, ISCHIA_E_MEMORY, "not enough memory to order %d equations", n);
+    common_init(&common, CHOLMOD_GIVEN);
+    cholmod_sparse *A = pattern_of(n, start, row, &common);
+    const bool ordered = A != NULL && order_pattern(A, order, &common);
+    if (ordered) memcpy(ret_order, order, (size_t)n * sizeof *order);
+    cholmod_free_sparse(&A, &common);
+    cholmod_finish(&common);
     free(order);
+    CHECK(ordered, err, ISCHIA_E_MEMORY, "not enough memory to order %d equations", n);
+    return ISCHIA_OK;
 }
 
 static bool pattern_init(struct linear *l, int n, const int *start, const int *row)
 {
-    const size_t nnz = (size_t)start[n];
-    l->A = cholmod_allocate_sparse((size_t)n, (size_t)n, nnz, 1, 1, -1, CHOLMOD_REAL, &l->common);
+    l->A = pattern_of(n, start, row, &l->common);
     if (l->A == NULL) return false;
-    memcpy(l->A->p, start, sizeof(int) * (size_t)(n + 1));
-    memcpy(l->A->i, row, sizeof(int) * nnz);
-    memset(l->A->x, 0, sizeof(double) * nnz);
     l->masked = cholmod_copy_sparse(l->A, &l->common);
     if (l->masked == NULL) return false;
-    analyse(l);
+    l->L = cholmod_analyze(l->A, &l->common);
     return l->L != NULL && l->common.status == CHOLMOD_OK;
 }
 
@@ -74,7 +98,7 @@ enum ischia_code linear_create(struct linear **ret, int n, const int *start, con
 {
     struct linear *l = calloc(1, sizeof *l);
     CHECK(l != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the linear solver");
-    common_init(&l->common);
+    common_init(&l->common, CHOLMOD_NATURAL);
     if (!pattern_init(l, n, start, row)) {
         const int status = l->common.status;
         linear_destroy(l);

@@ -20,7 +20,15 @@ enum linear_outcome {
 };
 
 /*
- * Analyses the pattern: n columns; column j holds row[start[j]] ... row[start[j + 1] - 1]. The
+ * An order of the equations in which the factor fills in little (METIS' nested dissection, then
+ * postordered): ret_order[k] is the equation that comes k-th. The pattern as below.
+ */
+ISCHIA_MUST_CHECK enum ischia_code linear_order(int n, const int *start, const int *row,
+                                                int *ret_order, struct ischia_error *err);
+
+/*
+ * Analyses the pattern, in the order the equations are in (linear_order first: factoring then needs
+ * no permutation): n columns; column j holds row[start[j]] ... row[start[j + 1] - 1]. The
  * pattern is copied. *ret is the caller's to destroy.
  */
 ISCHIA_MUST_CHECK enum ischia_code linear_create(struct linear **ret, int n, const int *start,

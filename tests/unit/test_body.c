@@ -15,9 +15,9 @@
 #include "tests/unit/near.h"
 
 static const struct element_material materials[TISSUE_COUNT] = {
-    [TISSUE_MUSCLE] = {0.008, 0.4, 0.04},
-    [TISSUE_FAT] = {0.004, 0.2, 0.02},
-    [TISSUE_SKIN] = {0.06, 3, 0.3},
+    [TISSUE_MUSCLE] = {0.008, 0.4, 0.04, 0},
+    [TISSUE_FAT] = {0.004, 0.2, 0.02, 0},
+    [TISSUE_SKIN] = {0.06, 3, 0.3, 0},
 };
 
 /* A box of all three tissues with its equations; a distorted state u, and room for derivatives. */
