@@ -11,6 +11,7 @@
 #include <assert.h>
 #include <cjson/cJSON.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "api/json_scan.h"
@@ -22,6 +23,8 @@ const char *const json_type_names[JSON_TYPE_COUNT] = {
 
 const struct json_limits json_limits_request = {
     .bytes_max = 64 * 1024, .depth_max = 16, .members_max = 256};
+const struct json_limits json_limits_record = {
+    .bytes_max = 256 * 1024, .depth_max = 32, .members_max = 256};
 const struct json_limits json_limits_stored = {
     .bytes_max = 16 * 1024 * 1024, .depth_max = 16, .members_max = 256};
 
@@ -102,6 +105,54 @@ enum ischia_code json_parse(struct json **ret, const char *text, size_t length,
 
 void json_destroy(struct json *root) { cJSON_Delete((cJSON *)(void *)root); }
 
+/* The next number in a text that json_scan has passed, from *at on; its length, 0 at the end. */
+static size_t next_number(const char *text, size_t length, size_t *at)
+{
+    for (bool quoted = false; *at < length; (*at)++) {
+        const char c = text[*at];
+        if (c == '"') quoted = !quoted;
+        if (quoted && c == '\\') (*at)++; /* what is escaped is no closing quote */
+        if (quoted || c == '\0' || strchr("-0123456789", c) == NULL) continue;
+        size_t end = *at;
+        while (end < length && text[end] != '\0' && strchr("+-.0123456789eE", text[end]) != NULL)
+            end++;
+        return end - *at;
+    }
+    return 0;
+}
+
+struct digits_walk {
+    const char *text;
+    size_t length, at;
+};
+
+/* cJSON leaves valuestring NULL for numbers, and frees it with the node. Tree and text have the
+ * numbers in the same order. */
+static bool keep_digits(cJSON *item, struct digits_walk *walk)
+{
+    for (cJSON *m = item->child; m != NULL; m = m->next)
+        if (!keep_digits(m, walk)) return false;
+    if (!cJSON_IsNumber(item)) return true;
+    const size_t size = next_number(walk->text, walk->length, &walk->at);
+    item->valuestring = strndup(walk->text + walk->at, size);
+    walk->at += size;
+    return item->valuestring != NULL;
+}
+
+enum ischia_code json_keep_digits(struct json *root, const char *text, size_t length,
+                                  struct ischia_error *err)
+{
+    struct digits_walk walk = {text, length, 0};
+    CHECK(keep_digits((cJSON *)(void *)root, &walk), err, ISCHIA_E_MEMORY,
+          "out of memory while reading a JSON document");
+    return ISCHIA_OK;
+}
+
+const char *json_digits(const struct json *value)
+{
+    return cJSON_IsNumber(node(value)) ? node(value)->valuestring : NULL;
+}
+
 enum json_type json_type_of(const struct json *value)
 {
     const cJSON *item = node(value);
@@ -139,7 +190,10 @@ size_t json_count(const struct json *value)
     return count;
 }
 
-const struct json *json_first(const struct json *value) { return opaque(node(value)->child); }
+const struct json *json_first(const struct json *value)
+{
+    return value == NULL ? NULL : opaque(node(value)->child);
+}
 
 const struct json *json_next(const struct json *member) { return opaque(node(member)->next); }
 

@@ -36,6 +36,7 @@ struct json_limits {
 };
 extern const struct json_limits
     json_limits_request;                            /* 64 KiB, 16, 256: what a client may send    */
+extern const struct json_limits json_limits_record; /* 256 KiB, 32, 256: what record systems send */
 extern const struct json_limits json_limits_stored; /* 16 MiB, 16, 256: what we wrote ourselves   */
 
 /*
@@ -53,6 +54,13 @@ ISCHIA_MUST_CHECK enum ischia_code json_parse(struct json **ret, const char *tex
                                               struct doc_faults *faults, struct ischia_error *err);
 void json_destroy(struct json *root); /* NULL allowed */
 
+/* Notes the digits of every number as they stand in the text that root was parsed from, so that
+ * json_digits can give them back: 7.10 stays "7.10". ISCHIA_E_MEMORY. */
+ISCHIA_MUST_CHECK enum ischia_code json_keep_digits(struct json *root, const char *text,
+                                                    size_t length, struct ischia_error *err);
+/* Of a JSON_NUMBER after json_keep_digits; else NULL. */
+const char *json_digits(const struct json *value);
+
 /* Looking at a value; strings live as long as the document. */
 enum json_type json_type_of(const struct json *value);
 bool json_bool(const struct json *value);     /* JSON_BOOL (asserted)                 */
@@ -62,10 +70,10 @@ const char *json_key(const struct json *member);   /* of a member of an object; 
 size_t json_count(const struct json *value);       /* of an array's or object's members     */
 
 /* Members in document order: for (m = json_first(v); m != NULL; m = json_next(m)). NULL for an
- * empty one and for values that are neither array nor object. */
+ * empty one, for values that are neither array nor object, and for NULL. */
 const struct json *json_first(const struct json *value);
 const struct json *json_next(const struct json *member);
-/* The first member with this key, NULL when there is none or object is not an object. */
+/* The first member with this key, NULL when there is none or object is NULL or not an object. */
 const struct json *json_member(const struct json *object, const char *key);
 
 const char *json_library_version(void); /* of cJSON, as it runs: "1.7.15" */

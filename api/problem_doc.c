@@ -19,6 +19,7 @@ const struct problem_info problem_kinds[PROBLEM_KIND_COUNT] = {
     [PROBLEM_NOT_ACCEPTABLE] = {"/docs#problem-not-acceptable", "No such representation", 406},
     [PROBLEM_TIMEOUT] = {"/docs#problem-timeout", "The request did not arrive in time", 408},
     [PROBLEM_CONFLICT] = {"/docs#problem-conflict", "Not possible in the present state", 409},
+    [PROBLEM_PRECONDITION] = {"/docs#problem-precondition", "Data are missing", 412},
     [PROBLEM_TOO_LARGE] = {"/docs#problem-too-large", "The body is too large", 413},
     [PROBLEM_MEDIA_TYPE_WRONG] = {"/docs#problem-media-type", "The media type is not accepted",
                                   415},

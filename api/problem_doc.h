@@ -22,6 +22,7 @@ enum problem_kind {
     PROBLEM_NOT_ACCEPTABLE,    /* 406                                                    */
     PROBLEM_TIMEOUT,           /* 408 the request did not arrive in time                 */
     PROBLEM_CONFLICT,          /* 409 not in the present state                           */
+    PROBLEM_PRECONDITION,      /* 412 what the answer would be made of is missing        */
     PROBLEM_TOO_LARGE,         /* 413                                                    */
     PROBLEM_MEDIA_TYPE_WRONG,  /* 415                                                    */
     PROBLEM_INVALID,           /* 422 the document says something wrong: see errors      */

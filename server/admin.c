@@ -19,6 +19,9 @@ const char admin_help[] =
     "  token revoke ID       Makes a token invalid within a second.\n"
     "  audit verify          Checks the chain of the audit log and prints its head.\n"
     "  audit list            Prints the audit log.\n"
+    "  feedback list         Prints what clinicians answered to CDS cards, a JSON object a line.\n"
+    "  outbox list           Prints what waits to be told to record systems, and why.\n"
+    "  outbox retry          Makes all of it due now, also what was given up.\n"
     "  backup FILE           Copies the whole store into a new file, while the daemon runs or "
     "not.\n"
     "  restore FILE          Replaces the content of the store by that of a backup.\n";
@@ -130,6 +133,56 @@ static enum ischia_code list(struct store *store, char *const *words, int count,
     return audit_list(store, stdout, err);
 }
 
+/* ------------------------------------------------------------------------ exchange */
+
+static bool print_feedback(void *context, const struct store_feedback *row)
+{
+    char card[UUID_TEXT_BYTES];
+    (void)context;
+    uuid_format(&row->card, card);
+    (void)printf("{\"at_ms\":%lld,\"service\":\"%s\",\"card\":\"%s\",\"feedback\":%s}\n",
+                 (long long)row->at_ms, row->service, card, row->document);
+    return true;
+}
+
+static enum ischia_code feedback_list(struct store *store, char *const *words, int count,
+                                      struct ischia_error *err)
+{
+    (void)words;
+    (void)count;
+    return store_feedback_list(store, print_feedback, NULL, err);
+}
+
+static bool print_outbox(void *context, const struct store_outbox_row *row)
+{
+    char id[UUID_TEXT_BYTES];
+    (void)context;
+    uuid_format(&row->delivery.id, id);
+    (void)printf("%s %s %s attempts=%d due_ms=%lld%s %s\n", row->target, id,
+                 store_change_names[row->delivery.kind], row->delivery.attempts,
+                 (long long)row->due_ms, row->given_up ? " given-up" : "", row->problem);
+    return true;
+}
+
+static enum ischia_code outbox_list(struct store *store, char *const *words, int count,
+                                    struct ischia_error *err)
+{
+    (void)words;
+    (void)count;
+    return store_outbox_list(store, print_outbox, NULL, err);
+}
+
+static enum ischia_code outbox_retry(struct store *store, char *const *words, int count,
+                                     struct ischia_error *err)
+{
+    int due = 0;
+    (void)words;
+    (void)count;
+    TRY(store_outbox_revive(store, &due, err));
+    (void)printf("%d\n", due);
+    return ISCHIA_OK;
+}
+
 static enum ischia_code backup(struct store *store, char *const *words, int count,
                                struct ischia_error *err)
 {
@@ -153,6 +206,9 @@ static const struct command commands[] = {
     {"token", "revoke", 1, 1, token_revoke, "token.revoke"},
     {"audit", "verify", 0, 0, verify, NULL},
     {"audit", "list", 0, 0, list, NULL},
+    {"feedback", "list", 0, 0, feedback_list, NULL},
+    {"outbox", "list", 0, 0, outbox_list, NULL},
+    {"outbox", "retry", 0, 0, outbox_retry, "outbox.retry"},
     {"backup", NULL, 1, 1, backup, "backup"},
 };
 

@@ -65,6 +65,46 @@ const struct config_option config_options[] = {
     TEXT(allowed_origins, "",
          "Origins, separated by commas, whose pages may change something; this server's own "
          "always may."),
+    TEXT(public_url, "",
+         "Address under which others reach this service, as https://host: in links of FHIR "
+         "resources, cards, messages and webhooks; empty: that of the request."),
+    TEXT(cds_issuers, "",
+         "JSON file with the issuers and keys whose signed tokens CDS services take, instead of "
+         "access tokens; empty: access tokens. Needs public_url."),
+    TEXT(hl7_listen, "",
+         "Address and port for HL7 v2 over MLLP; empty: off. Anything but the loopback address "
+         "needs hl7_tls with hl7_client_ca, or behind_proxy."),
+    SWITCH(hl7_tls, "false", "TLS on hl7_listen, with tls_certificate and tls_key."),
+    TEXT(hl7_client_ca, "",
+         "PEM file: those who send HL7 v2 over TLS have to show a certificate of this authority."),
+    TEXT(hl7_application, "ISCHIA", "MSH-3 of the HL7 v2 messages sent."),
+    TEXT(hl7_facility, "", "MSH-4 of the HL7 v2 messages sent."),
+    TEXT(hl7_peer, "",
+         "HOST:PORT of the record system that is sent an ORU^R01 over MLLP when an assessment "
+         "ends; empty: none."),
+    SWITCH(hl7_peer_tls, "false", "TLS to hl7_peer."),
+    TEXT(hl7_peer_application, "", "MSH-5 of the results sent to hl7_peer."),
+    TEXT(hl7_peer_facility, "", "MSH-6 of the results sent to hl7_peer."),
+    TEXT(webhook_url, "",
+         "Address that is told by a signed POST when an assessment ends; empty: none."),
+    TEXT(webhook_secret, "", "File with the secret that signs webhooks; needed with webhook_url."),
+    TEXT(push_url, "",
+         "Base of a FHIR server that a DiagnosticReport is posted to when an assessment ends; "
+         "empty: none."),
+    TEXT(push_token_url, "",
+         "Token endpoint for push_url (SMART Backend Services); empty: no authorization."),
+    TEXT(push_client, "", "Client id at push_token_url."),
+    TEXT(push_key, "", "PEM file with the private key (P-384 or RSA) of push_client."),
+    TEXT(push_key_id, "", "Key id (kid) of push_key as push_token_url knows it."),
+    TEXT(push_scope, "system/DiagnosticReport.c", "Scope asked for at push_token_url."),
+    TEXT(outbound_ca, "",
+         "PEM file with the authorities that webhook_url, push_url, push_token_url and hl7_peer "
+         "are checked against; empty: the system's."),
+    NUMBER("outbound_pause", outbound_pause_s, "s", 1, 86400, "60", false,
+           "Longest pause before something that could not be delivered is tried again; pauses "
+           "begin at a second and double."),
+    NUMBER("outbound_days", outbound_days, "d", 1, 365, "7", false,
+           "How long a delivery is tried before it is given up."),
     NUMBER("http_threads", http_threads, "threads", 0, 256, "0", false,
            "Threads that answer requests; 0: one a processor core, at most 8."),
     NUMBER("connections", connections, "connections", 16, 1000000, "4096", false,
@@ -371,10 +411,54 @@ enum ischia_code config_read_environment(struct config *config, char *const *env
     return ISCHIA_OK;
 }
 
+/* "" or http(s)://host with an optional path, without anything that must be escaped. */
+static bool url_is_plain(const char *url)
+{
+    const size_t length = strlen(url);
+    if (length == 0) return true;
+    if (strncmp(url, "http://", 7) != 0 && strncmp(url, "https://", 8) != 0) return false;
+    for (const char *c = url; *c != '\0'; c++)
+        if ((unsigned char)*c <= 0x20 || (unsigned char)*c >= 0x7f ||
+            strchr("\"<>?#\\", *c) != NULL)
+            return false;
+    return url[length - 1] != '/';
+}
+
+/* What stands in MSH as it is. */
+static enum ischia_code check_hl7_names(const struct config *config, struct ischia_error *err)
+{
+    const char *const names[] = {config->hl7_application, config->hl7_facility,
+                                 config->hl7_peer_application, config->hl7_peer_facility};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
+        for (const char *c = names[i]; *c != '\0'; c++)
+            CHECK((unsigned char)*c >= 0x20 && (unsigned char)*c < 0x7f &&
+                      strchr("|^~\\&", *c) == NULL,
+                  err, ISCHIA_E_INPUT, "an HL7 name is '%.40s'; accepted ASCII without |^~\\&",
+                  names[i]);
+    CHECK(config->hl7_application[0] != '\0', err, ISCHIA_E_INPUT, "hl7_application is empty");
+    return ISCHIA_OK;
+}
+
 enum ischia_code config_check(const struct config *config, struct ischia_error *err)
 {
     CHECK((config->tls_certificate[0] == '\0') == (config->tls_key[0] == '\0'), err, ISCHIA_E_INPUT,
           "tls_certificate and tls_key go together: set both or neither");
+    CHECK(config->cds_issuers[0] == '\0' || config->public_url[0] != '\0', err, ISCHIA_E_INPUT,
+          "cds_issuers needs public_url: tokens are made out for an address");
+    CHECK(!config->hl7_tls || config->tls_certificate[0] != '\0', err, ISCHIA_E_INPUT,
+          "hl7_tls needs tls_certificate and tls_key");
+    CHECK(config->hl7_client_ca[0] == '\0' || config->hl7_tls, err, ISCHIA_E_INPUT,
+          "hl7_client_ca needs hl7_tls");
+    CHECK((config->webhook_url[0] == '\0') == (config->webhook_secret[0] == '\0'), err,
+          ISCHIA_E_INPUT, "webhook_url and webhook_secret go together: set both or neither");
+    CHECK(config->push_token_url[0] == '\0' ||
+              (config->push_client[0] != '\0' && config->push_key[0] != '\0' &&
+               config->push_url[0] != '\0'),
+          err, ISCHIA_E_INPUT, "push_token_url needs push_url, push_client and push_key");
+    TRY(check_hl7_names(config, err));
+    CHECK(url_is_plain(config->public_url), err, ISCHIA_E_INPUT,
+          "public_url is '%.80s'; write https://host without a slash at the end",
+          config->public_url);
     CHECK(config->listen[0] != '\0', err, ISCHIA_E_INPUT, "listen is empty");
     CHECK(config->state_dir[0] != '\0', err, ISCHIA_E_INPUT, "state_dir is empty");
     CHECK(config->connections_per_address <= config->connections, err, ISCHIA_E_INPUT,

@@ -13,6 +13,7 @@
 
 #include "server/admin.h"
 #include "server/config.h"
+#include "server/hl7/listener.h"
 #include "server/http/listen.h"
 #include "server/http/routes.h"
 #include "server/http/service.h"
@@ -20,7 +21,9 @@
 #include "server/log.h"
 #include "server/metrics.h"
 #include "server/notify.h"
+#include "server/outbound/outbound.h"
 #include "server/sandbox.h"
+#include "server/textfile.h"
 
 /*
  * The daemon. main reads the options; serve is a chain of steps, each with its undoing, and the
@@ -28,11 +31,14 @@
  */
 
 enum { EXIT_USAGE = 2, TICK_MS = 1000, RETIRE_EVERY_S = 60, RETIRE_BATCH = 200 };
-enum { SWEEP_AGE_MS = 5 * 60 * 1000, TLS_FILE_BYTES = 256 * 1024 };
+enum { SWEEP_AGE_MS = 5 * 60 * 1000 };
 
 struct daemon {
     struct service service;
     struct arguments *arguments;
+    struct link_tls *hl7_tls; /* NULL: plain */
+    struct listener *hl7;     /* NULL: off   */
+    struct outbound *outbound;
     char worker_program[PATH_MAX];
     int64_t retire_at_ms, watchdog_at_ms;
 };
@@ -145,24 +151,6 @@ static enum ischia_code load_config(struct config *ret, const struct arguments *
 
 /* ----------------------------------------------------------------------------- steps */
 
-static enum ischia_code read_text(const char *path, char **ret, struct ischia_error *err)
-{
-    char *text = calloc(1, TLS_FILE_BYTES);
-    CHECK(text != NULL, err, ISCHIA_E_MEMORY, "no memory for %s", path);
-    FILE *file = fopen(path, "re");
-    if (file == NULL) {
-        free(text);
-        return FAIL(err, ISCHIA_E_IO, "cannot open %s: %s", path, strerror(errno));
-    }
-    const size_t size = fread(text, 1, TLS_FILE_BYTES - 1, file);
-    const bool good = ferror(file) == 0 && size > 0;
-    (void)fclose(file);
-    if (!good) free(text);
-    CHECK(good, err, ISCHIA_E_IO, "cannot read %s", path);
-    *ret = text;
-    return ISCHIA_OK;
-}
-
 static bool uses_tls(const struct config *config) { return config->tls_certificate[0] != '\0'; }
 
 static void log_expiry(time_t expires)
@@ -181,11 +169,11 @@ static enum ischia_code load_tls(const struct config *config, struct ischia_erro
     char *certificate = NULL, *key = NULL;
     time_t expires = 0;
     if (!uses_tls(config)) return ISCHIA_OK;
-    enum ischia_code code = read_text(config->tls_certificate, &certificate, err);
-    if (code == ISCHIA_OK) code = read_text(config->tls_key, &key, err);
+    enum ischia_code code = textfile_read(config->tls_certificate, &certificate, err);
+    if (code == ISCHIA_OK) code = textfile_read(config->tls_key, &key, err);
     if (code == ISCHIA_OK) code = tls_set(certificate, key, &expires, err);
     if (code == ISCHIA_OK) log_expiry(expires);
-    if (key != NULL) explicit_bzero(key, TLS_FILE_BYTES);
+    if (key != NULL) explicit_bzero(key, strlen(key));
     free(certificate);
     free(key);
     return code;
@@ -256,6 +244,7 @@ static enum ischia_code create_parts(struct daemon *d, struct ischia_error *err)
     TRY(auth_create(&s->auth, s->store, err));
     TRY(audit_create(&s->audit, s->store, err));
     TRY(rate_create(&s->rate, err));
+    if (s->config.cds_issuers[0] != '\0') TRY(trust_create(&s->trust, s->config.cds_issuers, err));
     return documents_create(&s->documents, err);
 }
 
@@ -307,8 +296,9 @@ static void on_finished(void *context, const struct uuid *id, enum queue_state s
     };
     char text[UUID_TEXT_BYTES];
     struct log_value quoted;
-    (void)context;
+    const struct daemon *d = context;
     uuid_format(id, text);
+    if (queue_is_final(state)) outbound_wake(d->outbound);
     if (queue_is_final(state)) metrics_solve(outcomes[state], (double)wall_ms / 1e3);
     LOG_INFO("assessment ended", "id=%s status=%s end=%s wall_ms=%lld detail=%s", text,
              queue_state_names[state], pool_end_names[end], (long long)wall_ms,
@@ -390,6 +380,53 @@ static enum ischia_code start_http(struct daemon *d, struct ischia_error *err)
     return http_start(&d->service.http, &options, &app, err);
 }
 
+/* HL7 v2 says nothing about who may send: beyond this machine a certificate has to. */
+static enum ischia_code check_hl7_access(const struct config *config, struct ischia_error *err)
+{
+    bool loopback = false;
+    if (config->hl7_listen[0] == '\0') return ISCHIA_OK;
+    TRY(listen_is_loopback(config->hl7_listen, &loopback, err));
+    CHECK(
+        loopback || config->behind_proxy || (config->hl7_tls && config->hl7_client_ca[0] != '\0'),
+        err, ISCHIA_E_INPUT,
+        "%s is not a loopback address: set hl7_tls and hl7_client_ca, or give --behind-proxy when "
+        "something else does access control",
+        config->hl7_listen);
+    return ISCHIA_OK;
+}
+
+static enum ischia_code load_hl7_tls(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    char *certificate = NULL, *key = NULL, *ca = NULL;
+    if (!config->hl7_tls) return ISCHIA_OK;
+    enum ischia_code code = textfile_read(config->tls_certificate, &certificate, err);
+    if (code == ISCHIA_OK) code = textfile_read(config->tls_key, &key, err);
+    if (code == ISCHIA_OK && config->hl7_client_ca[0] != '\0')
+        code = textfile_read(config->hl7_client_ca, &ca, err);
+    if (code == ISCHIA_OK) code = link_tls_create(&d->hl7_tls, certificate, key, ca, err);
+    free(certificate);
+    free(key);
+    free(ca);
+    return code;
+}
+
+static enum ischia_code start_hl7(struct daemon *d, struct ischia_error *err)
+{
+    const struct config *config = &d->service.config;
+    if (config->hl7_listen[0] == '\0') return ISCHIA_OK;
+    TRY(check_hl7_access(config, err));
+    TRY(load_hl7_tls(d, err));
+    const struct listener_options options = {.listen = config->hl7_listen,
+                                             .application = config->hl7_application,
+                                             .facility = config->hl7_facility,
+                                             .tls = d->hl7_tls,
+                                             .queue_limit = config->queue_limit,
+                                             .queue = d->service.queue,
+                                             .audit = d->service.audit};
+    return listener_start(&d->hl7, &options, err);
+}
+
 /* ------------------------------------------------------------------------------ loop */
 
 static void announce(const struct daemon *d)
@@ -399,6 +436,9 @@ static void announce(const struct daemon *d)
     (void)fflush(stdout);
     LOG_INFO("listening", "address=%s://%s version=%s", scheme, http_address(d->service.http),
              ISCHIA_VERSION);
+    if (d->hl7 != NULL)
+        LOG_INFO("listening", "address=mllp://%s tls=%d", listener_address(d->hl7),
+                 d->hl7_tls != NULL);
     (void)notify_manager("READY=1");
 }
 
@@ -500,7 +540,9 @@ static enum ischia_code start(struct daemon *d, struct ischia_error *err)
     TRY(create_parts(d, err));
     service_apply(&d->service);
     TRY(check_access(d, err));
+    TRY(outbound_create(&d->outbound, &d->service.config, d->service.store, err));
     TRY(start_queue(d, err));
+    TRY(start_hl7(d, err));
     return start_http(d, err);
 }
 
@@ -510,14 +552,18 @@ static void finish(struct daemon *d)
 {
     struct service *s = &d->service;
     http_stop(s->http);
+    listener_stop(d->hl7);
     queue_destroy(s->queue, 0);
+    outbound_destroy(d->outbound);
     store_close(s->store);
     http_destroy(s->http);
     events_destroy(s->events);
     documents_destroy(s->documents);
+    trust_destroy(s->trust);
     rate_destroy(s->rate);
     audit_destroy(s->audit);
     auth_destroy(s->auth);
+    link_tls_destroy(d->hl7_tls);
     tls_clear();
 }
 
@@ -583,6 +629,7 @@ static int check(const struct config *config)
                     "%s is not a loopback address: set tls_certificate and tls_key, or "
                     "behind_proxy",
                     config->listen);
+    if (code == ISCHIA_OK) code = check_hl7_access(config, &err);
     if (code != ISCHIA_OK) return complain(&err);
     (void)printf("The options are good.\n");
     return EXIT_SUCCESS;

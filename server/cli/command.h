@@ -19,6 +19,7 @@ int command_cohort(int argc, char **argv);
 int command_check_tangent(int argc, char **argv);
 int command_export(int argc, char **argv);
 int command_study(int argc, char **argv);
+int command_hl7(int argc, char **argv);
 int command_version(int argc, char **argv);
 int command_worker(int argc, char **argv); /* for ischiad: serves one socket, see worker.c */
 

@@ -21,6 +21,7 @@ static const struct command {
     {"cohort", command_cohort, "solve every row of a CSV file"},
     {"study", command_study, "designs of many solves, emulators, comparisons"},
     {"export", command_export, "write the model for CalculiX, ParaView or as a drawing"},
+    {"hl7", command_hl7, "send a side to an HL7 v2 port, to try it"},
     {"check-tangent", command_check_tangent, "compare derivatives with finite differences"},
     {"version", command_version, "versions of the program, the model and the libraries"},
     {"worker", command_worker, NULL},

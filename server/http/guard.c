@@ -6,6 +6,7 @@
 #include <strings.h>
 #include <time.h>
 
+#include "server/digest.h"
 #include "server/http/listen.h"
 #include "server/http/query.h"
 #include "server/http/reply.h"
@@ -112,10 +113,44 @@ static const char *scope_name(unsigned scope)
     return scope & AUTH_ASSESS ? "assess" : "read";
 }
 
+static bool is_cds(const struct call *call)
+{
+    return strncmp(call->request->target, "/cds-services", 13) == 0;
+}
+
+/* A record system shows who it is with a token that it signed itself. */
+static bool authorize_issuer(struct call *call, struct http_response *ret)
+{
+    char audience[CONFIG_TEXT_BYTES + HTTP_PATH_BYTES], issuer[TRUST_ISSUER_BYTES] = "";
+    unsigned char digest[DIGEST_BYTES];
+    char hex[DIGEST_HEX_BYTES];
+    const char *target = call->request->target;
+    (void)snprintf(audience, sizeof audience, "%s%.*s", call->service->config.public_url,
+                   (int)strcspn(target, "?"), target);
+    const char *why =
+        trust_check(call->service->trust, http_request_header(call->request, "Authorization"),
+                    audience, unix_ms() / 1000, issuer);
+    if (why == NULL) {
+        const struct digest_part part = digest_text(issuer);
+        digest_parts(&part, 1, digest);
+        digest_hex(digest, hex);
+        (void)snprintf(call->who.id, sizeof call->who.id, "iss-%.12s", hex);
+        call->who.scopes = AUTH_READ;
+        return true;
+    }
+    metrics_count(METRIC_REFUSED_AUTH);
+    (void)audit_change(call->service->audit, "-", "access", "", "401");
+    http_header_static(ret, "WWW-Authenticate", "Bearer realm=\"ischia\"");
+    reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED, "%s", why);
+    return false;
+}
+
 static bool authorize(struct call *call, struct http_response *ret)
 {
     const unsigned needed = call->route == NULL ? 0 : call->route->scope;
     const char *header = http_request_header(call->request, "Authorization");
+    if (needed != 0 && is_cds(call) && call->service->trust != NULL)
+        return within_rate(call, ret) && authorize_issuer(call, ret);
     const enum auth_verdict verdict =
         auth_check(call->service->auth, header, unix_ms(), &call->who);
     if (verdict == AUTH_GRANTED && call->who.id[0] != '-')
@@ -168,8 +203,24 @@ static const char *policy_of(const char *type)
     return strncmp(type, "image/svg", 9) == 0 ? picture_policy : document_policy;
 }
 
+/* Record systems that run in a browser: those on the list of origins may read CDS services. */
+static void put_cors(const struct call *call, struct http_response *response)
+{
+    const char *origin = http_request_header(call->request, "Origin");
+    if (origin == NULL || !is_cds(call) ||
+        !query_list_has(call->service->config.allowed_origins, origin))
+        return;
+    http_header(response, "Access-Control-Allow-Origin", "%s", origin);
+    http_header_static(response, "Vary", "Origin");
+    if (call->request->method != HTTP_OPTIONS) return;
+    http_header_static(response, "Access-Control-Allow-Methods", "GET, POST, OPTIONS");
+    http_header_static(response, "Access-Control-Allow-Headers", "Authorization, Content-Type");
+    http_header_static(response, "Access-Control-Max-Age", "600");
+}
+
 void guard_headers(const struct call *call, struct http_response *response)
 {
+    if (call != NULL) put_cors(call, response);
     /* A browser gives what it has kept the headers of a 304, which has no type to tell a page by: a
      * policy here would take the scripts from a page on its second visit. */
     if (response->status != 304)

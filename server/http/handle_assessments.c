@@ -4,11 +4,11 @@
 
 #include "api/case_doc.h"
 #include "api/problem_doc.h"
-#include "server/digest.h"
 #include "server/http/page.h"
 #include "server/http/query.h"
 #include "server/http/reply.h"
 #include "server/http/routes.h"
+#include "server/http/submit.h"
 #include "server/metrics.h"
 
 /*
@@ -18,18 +18,9 @@
  * back), and then, if the client prefers, for the end of the solve.
  */
 
-enum { WAIT_MAX_S = 60, IDEMPOTENCY_KEY_BYTES = 256, STOP_WAIT_MS = 10000 };
-static const int64_t for_ever_ms = INT64_MAX / 4;
-
 static double seconds_since(int64_t begun_us)
 {
     return (double)(metrics_now_us() - begun_us) / 1e6;
-}
-
-static int64_t wait_deadline(const struct call *call)
-{
-    const int seconds = query_prefer_wait(http_request_header(call->request, "Prefer"), WAIT_MAX_S);
-    return seconds < 0 ? 0 : call->request->begun_ms + (int64_t)seconds * 1000;
 }
 
 static void put_etag(struct call *call, const struct store_assessment *row, double fraction,
@@ -141,7 +132,7 @@ void handle_get(struct call *call, struct http_response *ret)
 {
     struct store_assessment row;
     if (call->request->woken == 0) {
-        call->deadline_ms = wait_deadline(call);
+        call->deadline_ms = submit_wait_deadline(call);
         /* Before the look into the store: what happens in between is then not missed. */
         if (call->deadline_ms > 0) (void)call_subscribe(call);
     }
@@ -188,132 +179,13 @@ static bool read_request(struct call *call, struct ischia_request *request,
     return false;
 }
 
-/* What a worker is given, and what makes two requests the same: nothing about the person. */
-static enum ischia_code case_text(const struct ischia_request *request, char **ret,
-                                  struct ischia_error *err)
-{
-    struct ischia_request bare = *request;
-    struct json_out out;
-    bare.subject[0] = bare.label[0] = bare.measured_at[0] = '\0';
-    bare.side = ISCHIA_SIDE_NONE;
-    json_out_init(&out, 0);
-    json_open_object(&out, NULL);
-    case_doc_write(&out, &bare);
-    json_close_object(&out);
-    return json_out_take(&out, ret, NULL, err);
-}
-
-static enum ischia_code warnings_text(const struct ischia_request *request, char **ret,
-                                      struct ischia_error *err)
-{
-    struct ischia_fault warnings[ISCHIA_PARAM_COUNT];
-    struct json_out out;
-    const size_t count = ischia_case_warnings(&request->values, warnings);
-    json_out_init(&out, 0);
-    json_open_array(&out, NULL);
-    for (size_t i = 0; i < count; i++) {
-        json_open_object(&out, NULL);
-        json_put_string(&out, "code", warnings[i].code);
-        json_put_string(&out, "pointer", warnings[i].pointer);
-        json_put_string(&out, "detail", warnings[i].detail);
-        json_close_object(&out);
-    }
-    json_close_array(&out);
-    return json_out_take(&out, ret, NULL, err);
-}
-
-static const char *text_or_null(const char *text) { return text[0] == '\0' ? NULL : text; }
-
-static void on_accepted(void *context, enum ischia_code code, const struct store_accepted *accepted,
-                        const struct ischia_error *err)
-{
-    struct deferred *deferred = context;
-    deferred->code = code;
-    if (code == ISCHIA_OK)
-        deferred->accepted = *accepted;
-    else
-        deferred->err = *err;
-    deferred_complete(deferred);
-}
-
-static enum ischia_code enqueue(struct call *call, const struct ischia_request *request,
-                                const char *key, struct ischia_error *err)
-{
-    char *case_json = NULL, *warnings_json = NULL;
-    struct store_new what = {
-        .subject = text_or_null(request->subject),
-        .side = request->side == ISCHIA_SIDE_NONE ? NULL : ischia_side_names[request->side],
-        .label = text_or_null(request->label),
-        .measured_at = text_or_null(request->measured_at),
-        .priority = QUEUE_CLINIC,
-        .client = call->who.id,
-        .idempotency_key = key,
-        .queued_max = atomic_load_explicit(&call->service->queue_limit, memory_order_relaxed),
-    };
-    const struct digest_part body = {call->request->body, call->request->body_size};
-    digest_parts(&body, 1, what.body_digest);
-    enum ischia_code code = case_text(request, &case_json, err);
-    if (code == ISCHIA_OK) code = warnings_text(request, &warnings_json, err);
-    what.case_json = case_json;
-    what.warnings_json = warnings_json;
-    struct deferred *deferred = code == ISCHIA_OK ? deferred_create(call) : NULL;
-    if (code == ISCHIA_OK && deferred == NULL)
-        code = FAIL(err, ISCHIA_E_MEMORY, "no memory for a request");
-    if (code == ISCHIA_OK) {
-        code = queue_accept_later(call->service->queue, &what, on_accepted, deferred, err);
-        if (code != ISCHIA_OK) { /* the callback will not come: give up its share */
-            http_release(deferred->exchange);
-            deferred_drop(deferred);
-        }
-    }
-    free(case_json);
-    free(warnings_json);
-    return code;
-}
-
-/* Printable ASCII, as RFC 9110 would have any header be; "" is none. */
-static bool read_key(struct call *call, const char **ret_key, struct http_response *ret)
-{
-    const char *key = http_request_header(call->request, "Idempotency-Key");
-    *ret_key = key;
-    if (key == NULL) return true;
-    const size_t length = strlen(key);
-    bool good = length > 0 && length < IDEMPOTENCY_KEY_BYTES;
-    for (size_t i = 0; i < length; i++) good = good && key[i] > 0x20 && key[i] < 0x7f;
-    if (good) return true;
-    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
-                  "Idempotency-Key has 1 to %d printable ASCII characters without blanks.",
-                  IDEMPOTENCY_KEY_BYTES - 1);
-    return false;
-}
-
 static void begin_submit(struct call *call, struct http_response *ret)
 {
     struct ischia_request request;
-    struct ischia_error err;
     const char *key = NULL;
-    call->deadline_ms = wait_deadline(call);
-    if (!read_key(call, &key, ret) || !read_request(call, &request, ret)) return;
-    if (enqueue(call, &request, key, &err) != ISCHIA_OK) {
-        reply_failure(call->request, ret, &err);
-        return;
-    }
-    ret->action = HTTP_WAIT; /* for the commit, however long the disk takes */
-    ret->wake_at_ms = for_ever_ms;
-}
-
-static void refuse_acceptance(struct call *call, const struct store_accepted *accepted,
-                              struct http_response *ret)
-{
-    if (accepted->acceptance == STORE_KEY_CONFLICT) {
-        reply_refusal(call->request, ret, PROBLEM_IDEMPOTENCY,
-                      "This Idempotency-Key came with another body before; use a new one.");
-        return;
-    }
-    http_header_static(ret, "Retry-After", "30");
-    reply_refusal(call->request, ret, PROBLEM_QUEUE_FULL,
-                  "%d assessments are waiting, which is the limit; nothing was stored.",
-                  accepted->queued);
+    call->deadline_ms = submit_wait_deadline(call);
+    if (!submit_read_key(call, &key, ret) || !read_request(call, &request, ret)) return;
+    submit_enqueue(call, &request, NULL, key, ret);
 }
 
 /* Queued durably: 303 to a form, 201 with the finished document, else 202. */
@@ -333,25 +205,8 @@ static void send_accepted(struct call *call, const struct store_assessment *row,
 
 static void finish_submit(struct call *call, struct http_response *ret)
 {
-    const struct deferred *deferred = call->deferred;
     struct store_assessment row;
-    if (deferred->code != ISCHIA_OK) {
-        reply_failure(call->request, ret, &deferred->err);
-        return;
-    }
-    const enum store_acceptance acceptance = deferred->accepted.acceptance;
-    if (acceptance == STORE_KEY_CONFLICT || acceptance == STORE_FULL) {
-        refuse_acceptance(call, &deferred->accepted, ret);
-        return;
-    }
-    if (call->id_text[0] == '\0') {
-        call->id = deferred->accepted.id;
-        uuid_format(&call->id, call->id_text);
-        metrics_count(METRIC_ASSESSMENTS_ACCEPTED);
-        metrics_store(STORE_ACCEPTS, (double)(http_now_ms() - call->request->begun_ms) / 1e3);
-        if (call->deadline_ms > 0) (void)call_subscribe(call);
-    }
-    if (!peek(call, &row, ret)) return;
+    if (!submit_take_accepted(call, ret) || !peek(call, &row, ret)) return;
     if (call_still_waits(call, queue_is_final(row.state)))
         call_wait(call, ret);
     else
@@ -360,17 +215,10 @@ static void finish_submit(struct call *call, struct http_response *ret)
 
 void handle_submit(struct call *call, struct http_response *ret)
 {
-    if (call->deferred == NULL) {
+    if (call->deferred == NULL)
         begin_submit(call, ret);
-    } else if (atomic_load(&call->deferred->done)) {
+    else if (submit_is_committed(call, ret))
         finish_submit(call, ret);
-    } else if (http_is_stopping(call->service->http) &&
-               http_now_ms() > call->request->begun_ms + STOP_WAIT_MS) {
-        ret->action = HTTP_DROP; /* the disk hangs: neither yes nor no would be true */
-    } else {
-        ret->action = HTTP_WAIT;
-        ret->wake_at_ms = for_ever_ms;
-    }
 }
 
 /* --------------------------------------------------------------------- cancel, erase */

@@ -12,6 +12,7 @@
 #include "server/http/page.h"
 #include "server/http/query.h"
 #include "server/http/reply.h"
+#include "server/http/report.h"
 #include "server/http/routes.h"
 
 /*
@@ -262,14 +263,25 @@ static void put_end(struct text_out *out, const struct store_assessment *row, bo
 
 /* ---------------------------------------------------------------------------- states */
 
+static void put_figure(struct text_out *out, const struct store_assessment *row)
+{
+    char id[UUID_TEXT_BYTES];
+    uuid_format(&row->id, id);
+    page_put(out, "<figure><figcaption>Section, loaded, coloured by Green\u2013Lagrange shear "
+                  "strain</figcaption><img alt=\"Section through the loaded tissue, coloured by "
+                  "shear strain, with the threshold's contour\" src=\"/v1/assessments/");
+    page_put(out, id);
+    page_put(out, "/section.svg\"></figure>\n");
+}
+
+/* attached: the text travels alone, without the picture that this service draws. */
 static enum ischia_code put_result(struct text_out *out, const struct store_assessment *row,
-                                   const struct ischia_request *request, struct ischia_error *err)
+                                   const struct ischia_request *request, bool attached,
+                                   struct ischia_error *err)
 {
     struct ischia_result r;
-    char id[UUID_TEXT_BYTES];
     TRY(result_doc_read(&r, NULL, row->result_json, strlen(row->result_json), &json_limits_stored,
                         err));
-    uuid_format(&row->id, id);
     put_words(out, &request->values, &r);
     page_put(out, "<div class=\"columns\">\n<div>\n");
     put_inputs(out, request);
@@ -278,11 +290,7 @@ static enum ischia_code put_result(struct text_out *out, const struct store_asse
     put_seat(out, &r.seat);
     page_put(out, "</div>\n</div>\n");
     put_clusters(out, &request->values, &r);
-    page_put(out, "<figure><figcaption>Section, loaded, coloured by Green\u2013Lagrange shear "
-                  "strain</figcaption><img alt=\"Section through the loaded tissue, coloured by "
-                  "shear strain, with the threshold's contour\" src=\"/v1/assessments/");
-    page_put(out, id);
-    page_put(out, "/section.svg\"></figure>\n");
+    if (!attached) put_figure(out, row);
     put_notes(out, &request->values);
     put_end(out, row, true);
     return ISCHIA_OK;
@@ -324,7 +332,7 @@ static enum ischia_code put_report(struct text_out *out, const struct store_asse
     page_put(out, "<article class=\"report\">\n");
     put_title(out, &request);
     if (row->state == QUEUE_SUCCEEDED) {
-        TRY(put_result(out, row, &request, err));
+        TRY(put_result(out, row, &request, false, err));
     } else {
         if (queue_is_final(row->state))
             put_failure(out, row);
@@ -336,6 +344,31 @@ static enum ischia_code put_report(struct text_out *out, const struct store_asse
     page_put(out, "</article>\n");
     page_end(out);
     return ISCHIA_OK;
+}
+
+enum ischia_code report_attachment(char **ret, const struct store_assessment *row,
+                                   struct ischia_error *err)
+{
+    struct ischia_request request;
+    struct text_out out;
+    enum ischia_code code = ISCHIA_OK;
+    TRY(documents_request(&request, row, err));
+    text_out_init(&out);
+    page_put(&out,
+             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Ischia: "
+             "report</title></head>\n<body>\n");
+    put_title(&out, &request);
+    if (row->state == QUEUE_SUCCEEDED) {
+        code = put_result(&out, row, &request, true, err);
+    } else {
+        put_failure(&out, row);
+        put_inputs(&out, &request);
+        put_end(&out, row, false);
+    }
+    page_put(&out, "</body></html>\n");
+    if (code == ISCHIA_OK) return text_out_take(&out, ret, NULL, err);
+    text_out_finish(&out);
+    return code;
 }
 
 static void send_report(struct call *call, const struct store_assessment *row,

@@ -83,6 +83,17 @@ enum query_answer query_find(const char *query, const char *key, char *ret, size
     return answer;
 }
 
+enum query_answer query_next(const char **at, char *ret_key, size_t key_size, char *ret_value,
+                             size_t value_size)
+{
+    struct pair pair;
+    if (!next_pair(at, &pair)) return QUERY_ABSENT;
+    return query_decode(pair.key, pair.key_length, true, ret_key, key_size) &&
+                   query_decode(pair.value, pair.value_length, true, ret_value, value_size)
+               ? QUERY_FOUND
+               : QUERY_BAD;
+}
+
 bool query_unknown(const char *query, const char *const *known, char *ret, size_t size)
 {
     struct pair pair;

@@ -17,6 +17,11 @@ enum query_answer { QUERY_ABSENT, QUERY_FOUND, QUERY_BAD };
  * not fit. ret is "" unless FOUND. */
 enum query_answer query_find(const char *query, const char *key, char *ret, size_t size);
 
+/* The next parameter from *at (a query string) on, decoded; *at moves behind it. ABSENT at the end;
+ * BAD: it cannot be decoded, or does not fit. */
+enum query_answer query_next(const char **at, char *ret_key, size_t key_size, char *ret_value,
+                             size_t value_size);
+
 /* Writes the first parameter that `known` (NULL-ended) does not list and returns true; false when
  * there is none. One that cannot be decoded is written as it stands. */
 bool query_unknown(const char *query, const char *const *known, char *ret, size_t size);

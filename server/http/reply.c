@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/fhir.h"
 #include "server/http/query.h"
 #include "server/log.h"
 
@@ -17,11 +18,34 @@ static void set_instance(struct problem *problem, const struct http_request *req
                    (int)strcspn(request->target, "?"), request->target);
 }
 
+/* Each protocol has its own form of an error. */
+static const struct error_form {
+    const char *prefix, *type, *no_memory;
+    enum ischia_code (*text)(char **, const struct problem *, struct ischia_error *);
+} error_forms[] = {
+    {"/fhir", FHIR_MEDIA_TYPE,
+     "{\"resourceType\":\"OperationOutcome\",\"issue\":[{\"severity\":\"error\","
+     "\"code\":\"transient\",\"details\":{\"text\":\"Out of memory\"}}]}",
+     fhir_outcome_text},
+    {"/", PROBLEM_MEDIA_TYPE,
+     "{\"type\":\"/docs#problem-out-of-memory\",\"title\":\"Out of memory\",\"status\":503}",
+     problem_doc_text},
+};
+
+static const struct error_form *error_form(const struct http_request *request)
+{
+    const struct error_form *form = error_forms;
+    const size_t length = strlen(form->prefix);
+    if (request == NULL || strncmp(request->target, form->prefix, length) != 0 ||
+        strchr("/?", request->target[length]) == NULL)
+        form++;
+    return form;
+}
+
 void reply_problem(const struct http_request *request, struct problem *problem,
                    struct http_response *ret)
 {
-    static const char no_memory[] = "{\"type\":\"/docs#problem-out-of-memory\","
-                                    "\"title\":\"Out of memory\",\"status\":503}";
+    const struct error_form *form = error_form(request);
     struct ischia_error err;
     char *text = NULL;
     ret->status = problem_kinds[problem->kind].status;
@@ -29,12 +53,12 @@ void reply_problem(const struct http_request *request, struct problem *problem,
     ret->etag[0] = '\0';
     set_instance(problem, request);
     http_header_static(ret, "Cache-Control", "no-store");
-    if (problem_doc_text(&text, problem, &err) == ISCHIA_OK) {
-        http_body(ret, PROBLEM_MEDIA_TYPE, text, strlen(text));
+    if (form->text(&text, problem, &err) == ISCHIA_OK) {
+        http_body(ret, form->type, text, strlen(text));
         return;
     }
     ret->status = 503;
-    http_body_static(ret, PROBLEM_MEDIA_TYPE, no_memory, sizeof no_memory - 1);
+    http_body_static(ret, form->type, form->no_memory, strlen(form->no_memory));
 }
 
 void reply_refusal(const struct http_request *request, struct http_response *ret,

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/fhir.h"
 #include "api/problem_doc.h"
 #include "server/http/guard.h"
 #include "server/http/query.h"
@@ -11,6 +12,7 @@
 #include "server/log.h"
 #include "server/metrics.h"
 
+enum { RECORD_BYTES_MAX = 256 * 1024, SEARCH_BYTES_MAX = 4096 };
 enum { CASE_BYTES_MAX = 64 * 1024, EMPTY_BODY_BYTES_MAX = 1024, ROUTES_MAX = 64 };
 
 #define JSON       "application/json"
@@ -18,6 +20,42 @@ enum { CASE_BYTES_MAX = 64 * 1024, EMPTY_BODY_BYTES_MAX = 1024, ROUTES_MAX = 64 
 #define HTML       "text/html; charset=utf-8"
 #define TYPES(...) ((const char *const[]){__VA_ARGS__, NULL})
 #define ASSESSMENT "/v1/assessments/{id}"
+
+#define FHIR_TYPES TYPES("application/fhir+json", "application/json")
+#define FHIR_QUERY TYPES("_format", "_pretty")
+/* What a server offers of one type: reading, and for some searching in both forms. */
+#define FHIR_READ(type, audit)                                                                     \
+    {                                                                                              \
+        HTTP_GET, "/fhir/" type "/{file}", "GET /fhir/" type "/{file}", handle_fhir_read,          \
+            AUTH_READ, 0, NULL, FHIR_TYPES, FHIR_QUERY, audit, false                               \
+    }
+#define FHIR_DEFINITION(type)                                                                      \
+    {                                                                                              \
+        HTTP_GET, "/fhir/" type "/{file}", "GET /fhir/" type "/{file}", handle_fhir_read, 0, 0,    \
+            NULL, FHIR_TYPES, FHIR_QUERY, NULL, false                                              \
+    }
+#define FHIR_SEARCH(type)                                                                          \
+    {                                                                                              \
+        HTTP_GET, "/fhir/" type, "GET /fhir/" type, handle_fhir_search, AUTH_READ, 0, NULL,        \
+            FHIR_TYPES, fhir_search_keys, "assessment.list", false                                 \
+    }
+#define CDS_HOOK(id)                                                                               \
+    {                                                                                              \
+        HTTP_POST, "/cds-services/" id, "POST /cds-services/" id, handle_cds_hook, AUTH_READ,      \
+            RECORD_BYTES_MAX, TYPES(JSON), TYPES(JSON), NULL, "cds.hook", false                    \
+    }
+#define CDS_FEEDBACK(id)                                                                           \
+    {                                                                                              \
+        HTTP_POST, "/cds-services/" id "/feedback", "POST /cds-services/" id "/feedback",          \
+            handle_cds_feedback, AUTH_READ, RECORD_BYTES_MAX, TYPES(JSON), TYPES(JSON), NULL,      \
+            "cds.feedback", false                                                                  \
+    }
+#define FHIR_POST_SEARCH(type)                                                                     \
+    {                                                                                              \
+        HTTP_POST, "/fhir/" type "/_search", "POST /fhir/" type "/_search", handle_fhir_search,    \
+            AUTH_READ, SEARCH_BYTES_MAX, TYPES(FORM), FHIR_TYPES, fhir_search_keys,                \
+            "assessment.list", false                                                               \
+    }
 
 const struct route routes[] = {
     {HTTP_POST, "/v1/assessments", "POST /v1/assessments", handle_submit, AUTH_ASSESS,
@@ -52,6 +90,32 @@ const struct route routes[] = {
      NULL, NULL, false},
     {HTTP_GET, "/version", "GET /version", handle_version, 0, 0, NULL, TYPES(JSON), NULL, NULL,
      false},
+    {HTTP_GET, "/fhir/metadata", "GET /fhir/metadata", handle_fhir_metadata, 0, 0, NULL, FHIR_TYPES,
+     TYPES("_format", "_pretty", "mode"), NULL, false},
+    {HTTP_POST, "/fhir/$assess", "POST /fhir/$assess", handle_fhir_assess, AUTH_ASSESS,
+     RECORD_BYTES_MAX, FHIR_TYPES, FHIR_TYPES, FHIR_QUERY, "assessment.create", false},
+    {HTTP_GET, "/fhir/async/{id}", "GET /fhir/async/{id}", handle_fhir_async, AUTH_READ, 0, NULL,
+     FHIR_TYPES, FHIR_QUERY, "assessment.read", false},
+    {HTTP_DELETE, "/fhir/async/{id}", "DELETE /fhir/async/{id}", handle_fhir_cancel, AUTH_ASSESS,
+     EMPTY_BODY_BYTES_MAX, NULL, FHIR_TYPES, FHIR_QUERY, "assessment.cancel", false},
+    FHIR_SEARCH("RiskAssessment"),
+    FHIR_POST_SEARCH("RiskAssessment"),
+    FHIR_READ("RiskAssessment", "assessment.read"),
+    FHIR_SEARCH("DiagnosticReport"),
+    FHIR_POST_SEARCH("DiagnosticReport"),
+    FHIR_READ("DiagnosticReport", "assessment.read"),
+    FHIR_READ("Observation", "assessment.read"),
+    FHIR_READ("Provenance", "assessment.read"),
+    FHIR_DEFINITION("Device"),
+    FHIR_DEFINITION("OperationDefinition"),
+    FHIR_DEFINITION("CodeSystem"),
+    FHIR_DEFINITION("StructureDefinition"),
+    {HTTP_GET, "/cds-services", "GET /cds-services", handle_cds_discovery, 0, 0, NULL, TYPES(JSON),
+     NULL, NULL, false},
+    CDS_HOOK("ischia-patient-view"),
+    CDS_FEEDBACK("ischia-patient-view"),
+    CDS_HOOK("ischia-order-select"),
+    CDS_FEEDBACK("ischia-order-select"),
     {HTTP_GET, "/docs", "GET /docs", handle_docs, 0, 0, NULL, TYPES("text/html"), NULL, NULL, true},
     {HTTP_GET, "/", "GET /", handle_home, 0, 0, NULL, TYPES("text/html"), TYPES("from"), NULL,
      true},
@@ -64,6 +128,12 @@ const struct route routes[] = {
      true},
 };
 const size_t route_count = sizeof routes / sizeof routes[0];
+
+enum route_contract route_contract_of(const struct route *route)
+{
+    if (strncmp(route->path, "/fhir/", 6) == 0) return ROUTE_FHIR;
+    return strncmp(route->path, "/cds-services", 13) == 0 ? ROUTE_CDS : ROUTE_OPENAPI;
+}
 
 /* ------------------------------------------------------------------------- finding */
 
@@ -120,8 +190,11 @@ const struct route *route_find(enum http_method method, const char *path, char *
 
 void routes_print(FILE *out)
 {
+    static const char *const contract_words[] = {
+        [ROUTE_OPENAPI] = "", [ROUTE_FHIR] = "fhir ", [ROUTE_CDS] = "cds "};
     for (size_t i = 0; i < route_count; i++)
-        (void)fprintf(out, "%s %s%s%s%s\n", routes[i].name, routes[i].is_page ? "page " : "",
+        (void)fprintf(out, "%s %s%s%s%s\n", routes[i].name,
+                      routes[i].is_page ? "page " : contract_words[route_contract_of(&routes[i])],
                       routes[i].scope == 0           ? "open"
                       : routes[i].scope == AUTH_READ ? "read"
                                                      : "",
@@ -217,6 +290,27 @@ static bool takes_type(const struct route *route, const char *content_type)
     return false;
 }
 
+/* What the client wants to have: under /fhir the parameter _format comes before the header. */
+static const char *wanted_type(const struct call *call)
+{
+    static const struct {
+        const char *word, *type;
+    } formats[] = {
+        {"json", FHIR_MEDIA_TYPE},
+        {"application/fhir+json", FHIR_MEDIA_TYPE},
+        {"application/fhir json", FHIR_MEDIA_TYPE}, /* a '+' that was not escaped */
+        {"application/json", "application/json"},
+        {"text/json", "application/json"},
+    };
+    char format[64];
+    const bool fhir = route_contract_of(call->route) == ROUTE_FHIR;
+    if (!fhir || query_find(call->request->query, "_format", format, sizeof format) == QUERY_ABSENT)
+        return http_request_header(call->request, "Accept");
+    for (size_t i = 0; i < sizeof formats / sizeof formats[0]; i++)
+        if (strcmp(format, formats[i].word) == 0) return formats[i].type;
+    return "application/fhir+xml"; /* whatever it is, it is not given */
+}
+
 static bool agree_on_types(struct call *call, struct http_response *ret)
 {
     const struct route *route = call->route;
@@ -228,7 +322,7 @@ static bool agree_on_types(struct call *call, struct http_response *ret)
         return false;
     }
     if (route->gives == NULL) return true;
-    call->accepted = query_accept(http_request_header(call->request, "Accept"), route->gives);
+    call->accepted = query_accept(wanted_type(call), route->gives);
     if (call->accepted >= 0) return true;
     reply_refusal(call->request, ret, PROBLEM_NOT_ACCEPTABLE, "This is given as %s%s%s.",
                   route->gives[0], route->gives[1] == NULL ? "" : " or ",
@@ -241,6 +335,9 @@ static bool read_query(struct call *call, struct http_response *ret)
     static const char *const none[] = {NULL};
     char name[64];
     const char *const *known = call->route->queries == NULL ? none : call->route->queries;
+    const bool fhir = route_contract_of(call->route) == ROUTE_FHIR;
+    const char *prefer = http_request_header(call->request, "Prefer");
+    if (fhir && prefer != NULL && strstr(prefer, "handling=lenient") != NULL) return true;
     if (call->route->is_page || !query_unknown(call->request->query, known, name, sizeof name))
         return true;
     reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,

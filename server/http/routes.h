@@ -13,6 +13,13 @@
  */
 typedef void route_handler(struct call *call, struct http_response *ret);
 
+/* Which document describes a route for programs; the path's beginning says it. */
+enum route_contract {
+    ROUTE_OPENAPI, /* openapi.json                                                      */
+    ROUTE_FHIR,    /* the CapabilityStatement; errors are OperationOutcomes             */
+    ROUTE_CDS      /* the discovery document of CDS Hooks                               */
+};
+
 struct route {
     enum http_method method; /* GET serves HEAD too */
     const char *path;        /* "/v1/assessments/{id}"; "{file}" takes all that is left */
@@ -27,6 +34,9 @@ struct route {
     bool is_page;               /* for people: not in openapi.json */
 };
 
+/* By the beginning of the route's path. */
+enum route_contract route_contract_of(const struct route *route);
+
 extern const struct route routes[];
 extern const size_t route_count;
 
@@ -39,6 +49,9 @@ const struct route *route_find(enum http_method method, const char *path, char *
 /* `ischiad --print-routes`: method, path, scope, a line each, for tests. */
 void routes_print(FILE *out);
 
+/* handle_fhir.c: what a search takes, NULL-ended */
+extern const char *const fhir_search_keys[];
+
 /* handle_*.c */
 route_handler handle_submit, handle_get, handle_list, handle_cancel, handle_erase;
 route_handler handle_events;
@@ -47,6 +60,9 @@ route_handler handle_report;
 route_handler handle_parameters, handle_changes;
 route_handler handle_openapi, handle_docs, handle_health, handle_ready, handle_metrics,
     handle_version;
+route_handler handle_fhir_metadata, handle_fhir_read, handle_fhir_search, handle_fhir_assess,
+    handle_fhir_async, handle_fhir_cancel;
+route_handler handle_cds_discovery, handle_cds_hook, handle_cds_feedback;
 route_handler handle_home, handle_form, handle_asset;
 
 #endif

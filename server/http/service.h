@@ -15,6 +15,7 @@
 #include "server/queue.h"
 #include "server/rate.h"
 #include "server/store/store.h"
+#include "server/trust.h"
 
 /* What the routes work with. The daemon's main owns the parts. */
 struct service {
@@ -26,6 +27,7 @@ struct service {
     struct audit *audit;
     struct rate *rate;
     struct documents *documents; /* finished documents, rendered */
+    struct trust *trust;         /* who may call CDS services; NULL: as everywhere, by token */
     /* Read at every request and changed by SIGHUP, hence atomic; the rest of config is constant. */
     struct config config;
     atomic_int rate_limit, rate_burst, queue_limit;

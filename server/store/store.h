@@ -85,7 +85,9 @@ struct store_new {
     const char *client;          /* who asks ("" when nobody is named): scope of the key below */
     const char *idempotency_key; /* NULL: none                                                */
     unsigned char body_digest[STORE_DIGEST_BYTES]; /* of the body as sent; with a key only    */
-    int queued_max; /* refuse when this many are queued already; 0: no limit     */
+    int queued_max;          /* refuse when this many are queued already; 0: no limit     */
+    const char *reference;   /* the person as a FHIR reference, as given; NULL: none            */
+    const char *origin_json; /* what else the sender must be told back; NULL: none              */
 };
 
 enum store_acceptance {
@@ -138,6 +140,7 @@ struct store_assessment {
     char *case_json, *warnings_json;
     char *result_json;  /* NULL unless succeeded                                              */
     char *problem_json; /* NULL unless failed                                                 */
+    char *origin_json;  /* NULL when it came without one                                      */
 };
 
 /* ret's strings are the caller's: store_assessment_finish. Only STORE_DONE fills *ret. */
@@ -162,6 +165,10 @@ struct store_filter {
     const char *side;    /* NULL: any                                                      */
     bool by_state;       /* false: any                                                     */
     enum queue_state state;
+    unsigned states;       /* bits of enum queue_state; 0: any                            */
+    const char *person[2]; /* a subject and a reference: either fits; both NULL: any      */
+    int64_t finished_from_ms, finished_before_ms; /* 0: no bound                          */
+    int64_t changed_from_ms, changed_before_ms;   /* 0: no bound                          */
     int limit;          /* 1 ... STORE_LIST_LIMIT_MAX                                     */
     const char *cursor; /* NULL: from the newest; else what an earlier page returned      */
     bool with_results;  /* false: result_json and problem_json stay NULL                  */
@@ -268,6 +275,81 @@ struct store_retention {
 ISCHIA_MUST_CHECK enum ischia_code store_retire(struct store *store,
                                                 const struct store_retention *rule, int batch,
                                                 int *ret_erased, struct ischia_error *err);
+
+/* ------------------------------------------------------------------------------- outbox
+ * Who is to be told how assessments ended. A target reads the change log once, from the moment it
+ * is first opened, into rows of its own; a row leaves when the target has confirmed it. */
+
+enum { STORE_TARGET_BYTES = 16, STORE_OUTBOX_PROBLEM_BYTES = 200 };
+
+struct store_delivery {
+    int64_t seq; /* of the row */
+    int64_t change_seq;
+    struct uuid id;
+    enum store_change_kind kind; /* succeeded, failed, cancelled */
+    int64_t created_ms;          /* when the assessment ended    */
+    int attempts;                /* so far                       */
+};
+
+/* Opens a target: from now on every end of an assessment is for it too. Idempotent. */
+ISCHIA_MUST_CHECK enum ischia_code store_outbox_open(struct store *store, const char *target,
+                                                     struct ischia_error *err);
+/* Forgets a target that is no longer configured, with what waits for it. */
+ISCHIA_MUST_CHECK enum ischia_code store_outbox_close(struct store *store, const char *target,
+                                                      struct ischia_error *err);
+/* Takes what ended since the last call into the target's rows. */
+ISCHIA_MUST_CHECK enum ischia_code store_outbox_fill(struct store *store, const char *target,
+                                                     struct ischia_error *err);
+/* The row that is due first, by now_ms; STORE_NOT_FOUND when none is: *ret_due_ms is then when the
+ * next one will be, 0 when there is none. */
+ISCHIA_MUST_CHECK enum ischia_code
+store_outbox_next(struct store *store, const char *target, int64_t now_ms,
+                  struct store_delivery *ret, int64_t *ret_due_ms, enum store_answer *ret_answer,
+                  struct ischia_error *err);
+/* The target has confirmed the row. */
+ISCHIA_MUST_CHECK enum ischia_code store_outbox_done(struct store *store, int64_t seq,
+                                                     struct ischia_error *err);
+/* It has not: again at due_ms, or never (given up). problem: for the operator. */
+ISCHIA_MUST_CHECK enum ischia_code
+store_outbox_retry(struct store *store, int64_t seq, int64_t due_ms, bool give_up,
+                   const char *problem, struct ischia_error *err);
+
+struct store_outbox_row {
+    struct store_delivery delivery;
+    char target[STORE_TARGET_BYTES];
+    int64_t due_ms;
+    bool given_up;
+    char problem[STORE_OUTBOX_PROBLEM_BYTES];
+};
+
+/* Called for each row; false stops. */
+typedef bool store_on_outbox(void *context, const struct store_outbox_row *row);
+/* Every row, oldest first. */
+ISCHIA_MUST_CHECK enum ischia_code store_outbox_list(struct store *store, store_on_outbox *on_row,
+                                                     void *context, struct ischia_error *err);
+/* Makes every row due now, also those given up; *ret_count: how many. */
+ISCHIA_MUST_CHECK enum ischia_code store_outbox_revive(struct store *store, int *ret_count,
+                                                       struct ischia_error *err);
+
+/* ----------------------------------------------------------------------------- feedback */
+
+struct store_feedback {
+    int64_t at_ms; /* filled in by the store */
+    const char *service;
+    struct uuid card; /* the assessment that the card showed */
+    const char *document;
+};
+
+/* Stores `count` answers at once, durably. */
+ISCHIA_MUST_CHECK enum ischia_code store_feedback_add(struct store *store,
+                                                      const struct store_feedback *rows,
+                                                      size_t count, struct ischia_error *err);
+/* Called for each row; false stops. */
+typedef bool store_on_feedback(void *context, const struct store_feedback *row);
+/* Every answer, oldest first. */
+ISCHIA_MUST_CHECK enum ischia_code store_feedback_list(struct store *store,
+                                                       store_on_feedback *on_row, void *context,
+                                                       struct ischia_error *err);
 
 /* ------------------------------------------------------------------------------- tokens */
 

@@ -19,6 +19,7 @@
  *   store_sqlite_job.c    accepting and the life of a job
  *   store_sqlite_read.c   get, list, changes, numbers
  *   store_sqlite_admin.c  tokens, audit      store_sqlite_copy.c  backup, restore
+ *   store_sqlite_exchange.c  outbox, feedback
  */
 
 /* ------------------------------------------------------------------------- connections */
@@ -66,11 +67,24 @@ enum sql {
     SQL_AUDIT_ADD,
     SQL_AUDIT_LIST,
     SQL_PROBE,
+    SQL_ORIGIN_ADD,
+    SQL_OUTBOX_OPEN,
+    SQL_OUTBOX_CLOSE,
+    SQL_OUTBOX_CLEAR,
+    SQL_OUTBOX_FILL,
+    SQL_OUTBOX_MOVE,
+    SQL_OUTBOX_NEXT,
+    SQL_OUTBOX_DONE,
+    SQL_OUTBOX_RETRY,
+    SQL_OUTBOX_LIST,
+    SQL_OUTBOX_REVIVE,
+    SQL_FEEDBACK_ADD,
+    SQL_FEEDBACK_LIST,
     SQL_COUNT
 };
 
 /* The columns that read_assessment (store_sqlite_read.c) expects, of "assessment a" and
- * "solution s". */
+ * "solution s" and "origin o". */
 extern const char *const sqlite_assessment_columns;
 
 struct db {

@@ -7,7 +7,7 @@
 #define ASSESSMENT_COLUMNS                                                                         \
     "a.id, a.seq, a.change_seq, a.state, a.priority, a.created_ms, a.started_ms, a.finished_ms, "  \
     "a.attempt, a.cached, a.subject, a.side, a.label, a.measured_at, a.case_json, "                \
-    "a.warnings_json, a.problem_json, s.result_json, s.field IS NOT NULL"
+    "a.warnings_json, a.problem_json, s.result_json, s.field IS NOT NULL, o.document"
 
 static const char *const sql_text[SQL_COUNT] = {
     /* IMMEDIATE: another process' write is met here, where waiting for it is harmless */
@@ -56,7 +56,8 @@ static const char *const sql_text[SQL_COUNT] = {
     [SQL_TOO_MANY] = "SELECT id FROM assessment WHERE finished_ms > 0 "
                      "ORDER BY finished_ms LIMIT 1",
     [SQL_GET] = "SELECT " ASSESSMENT_COLUMNS
-                " FROM assessment a LEFT JOIN solution s ON s.rowid = a.solution WHERE a.id = ?",
+                " FROM assessment a LEFT JOIN solution s ON s.rowid = a.solution "
+                "LEFT JOIN origin o ON o.assessment = a.seq WHERE a.id = ?",
     [SQL_FIELD] = "SELECT s.field FROM assessment a LEFT JOIN solution s ON s.rowid = a.solution "
                   "WHERE a.id = ?",
     [SQL_CHANGES] = "SELECT seq, kind, id, at_ms FROM change WHERE seq > ? ORDER BY seq LIMIT ?",
@@ -75,6 +76,31 @@ static const char *const sql_text[SQL_COUNT] = {
     [SQL_AUDIT_LIST] = "SELECT seq, at_ms, who, what, subject, outcome, detail, hash FROM audit "
                        "WHERE seq > ? ORDER BY seq",
     [SQL_PROBE] = "UPDATE number SET value = ? WHERE name = 'probe'",
+    [SQL_ORIGIN_ADD] = "INSERT INTO origin (assessment, reference, document) VALUES (?, ?, ?)",
+    [SQL_OUTBOX_OPEN] = "INSERT OR IGNORE INTO outbox_target (target, change_seq) "
+                        "SELECT ?, coalesce(max(seq), 0) FROM change",
+    [SQL_OUTBOX_CLOSE] = "DELETE FROM outbox_target WHERE target = ?",
+    [SQL_OUTBOX_CLEAR] = "DELETE FROM outbox WHERE target = ?",
+    /* kinds 3, 4, 5: succeeded, failed, cancelled */
+    [SQL_OUTBOX_FILL] = "INSERT OR IGNORE INTO outbox (target, change_seq, id, kind, created_ms, "
+                        "due_ms) SELECT t.target, c.seq, c.id, c.kind, c.at_ms, c.at_ms "
+                        "FROM outbox_target t JOIN change c ON c.seq > t.change_seq "
+                        "JOIN assessment a ON a.id = c.id "
+                        "WHERE t.target = ? AND c.kind IN (3, 4, 5) ORDER BY c.seq",
+    [SQL_OUTBOX_MOVE] = "UPDATE outbox_target SET change_seq = "
+                        "(SELECT coalesce(max(seq), 0) FROM change) WHERE target = ?",
+    [SQL_OUTBOX_NEXT] = "SELECT seq, change_seq, id, kind, created_ms, attempts, due_ms "
+                        "FROM outbox WHERE target = ? AND given_up = 0 "
+                        "ORDER BY due_ms, seq LIMIT 1",
+    [SQL_OUTBOX_DONE] = "DELETE FROM outbox WHERE seq = ?",
+    [SQL_OUTBOX_RETRY] = "UPDATE outbox SET attempts = attempts + 1, due_ms = ?, given_up = ?, "
+                         "problem = ? WHERE seq = ?",
+    [SQL_OUTBOX_LIST] = "SELECT seq, change_seq, id, kind, created_ms, attempts, due_ms, target, "
+                        "given_up, problem FROM outbox ORDER BY seq",
+    [SQL_OUTBOX_REVIVE] = "UPDATE outbox SET due_ms = ?, given_up = 0",
+    [SQL_FEEDBACK_ADD] = "INSERT INTO feedback (at_ms, service, card, document) "
+                         "VALUES (?, ?, ?, ?)",
+    [SQL_FEEDBACK_LIST] = "SELECT at_ms, service, card, document FROM feedback ORDER BY seq",
 };
 
 const char *const sqlite_assessment_columns = ASSESSMENT_COLUMNS;

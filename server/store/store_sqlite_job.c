@@ -136,6 +136,18 @@ static enum ischia_code insert_assessment(struct db *db, const struct accept *ac
     return query_run(&query, err);
 }
 
+static enum ischia_code insert_origin(struct db *db, const struct store_new *what, int64_t seq,
+                                      struct ischia_error *err)
+{
+    struct query query;
+    if (what->origin_json == NULL) return ISCHIA_OK;
+    TRY(query_begin(&query, db, SQL_ORIGIN_ADD, err));
+    query_put_integer(&query, seq);
+    query_put_text(&query, what->reference);
+    query_put_text(&query, what->origin_json);
+    return query_run(&query, err);
+}
+
 static enum ischia_code accept_new(struct store *store, struct db *db, struct accept *accept,
                                    int64_t solution, struct ischia_error *err)
 {
@@ -150,6 +162,7 @@ static enum ischia_code accept_new(struct store *store, struct db *db, struct ac
     if (solution != 0)
         TRY(change_add(store, db, STORE_CHANGE_SUCCEEDED, &accept->id, &change_seq, err));
     TRY(insert_assessment(db, accept, seq, change_seq, solution, err));
+    TRY(insert_origin(db, &accept->what, seq, err));
     return remember_key(db, accept, seq, err);
 }
 
@@ -196,13 +209,14 @@ static void accept_done(struct store *store, struct write *write)
     free(accept);
 }
 
-enum { NEW_TEXTS = 8 };
+enum { NEW_TEXTS = 10 };
 
 static void list_texts(struct store_new *what, const char **ret[NEW_TEXTS])
 {
     const char **const texts[NEW_TEXTS] = {
         &what->subject,   &what->side,          &what->label,  &what->measured_at,
-        &what->case_json, &what->warnings_json, &what->client, &what->idempotency_key};
+        &what->case_json, &what->warnings_json, &what->client, &what->idempotency_key,
+        &what->reference, &what->origin_json};
     memcpy(ret, texts, sizeof texts);
 }
 

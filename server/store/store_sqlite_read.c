@@ -17,11 +17,18 @@ void store_assessment_finish(struct store_assessment *a)
     free(a->warnings_json);
     free(a->problem_json);
     free(a->result_json);
+    free(a->origin_json);
     *a = (struct store_assessment){0};
 }
 
 /* The columns of sqlite_assessment_columns, in their order. */
-enum { COLUMN_FIRST_TEXT = 10, COLUMN_PROBLEM = 16, COLUMN_RESULT = 17, COLUMN_HAS_FIELD = 18 };
+enum {
+    COLUMN_FIRST_TEXT = 10,
+    COLUMN_PROBLEM = 16,
+    COLUMN_RESULT = 17,
+    COLUMN_HAS_FIELD = 18,
+    COLUMN_ORIGIN = 19
+};
 
 static enum ischia_code read_numbers(struct query *query, struct store_assessment *ret,
                                      struct ischia_error *err)
@@ -49,6 +56,7 @@ static enum ischia_code read_assessment(struct query *query, bool with_texts, bo
                            &ret->measured_at, &ret->case_json, &ret->warnings_json};
     for (int i = 0; with_texts && i < (int)(sizeof text / sizeof text[0]); i++)
         TRY(query_text(query, COLUMN_FIRST_TEXT + i, text[i], err));
+    if (with_texts) TRY(query_text(query, COLUMN_ORIGIN, &ret->origin_json, err));
     if (!with_documents) return ISCHIA_OK;
     TRY(query_text(query, COLUMN_PROBLEM, &ret->problem_json, err));
     return query_text(query, COLUMN_RESULT, &ret->result_json, err);
@@ -156,7 +164,34 @@ static bool read_cursor(const char *cursor, int64_t *ret_before)
     return true;
 }
 
-enum { LIST_TEXT_BYTES = 1024 };
+enum { LIST_TEXT_BYTES = 2048 };
+
+static bool has_person(const struct store_filter *filter)
+{
+    return filter->person[0] != NULL || filter->person[1] != NULL;
+}
+
+static bool has_times(const struct store_filter *filter)
+{
+    return filter->finished_from_ms != 0 || filter->finished_before_ms != 0 ||
+           filter->changed_from_ms != 0 || filter->changed_before_ms != 0;
+}
+
+static int64_t upper(int64_t bound_ms) { return bound_ms == 0 ? INT64_MAX : bound_ms; }
+
+static void put_exchange_bounds(struct query *query, const struct store_filter *filter)
+{
+    if (filter->states != 0) query_put_integer(query, (int64_t)filter->states);
+    if (has_person(filter)) {
+        query_put_text(query, filter->person[0]);
+        query_put_text(query, filter->person[1]);
+    }
+    if (!has_times(filter)) return;
+    query_put_integer(query, filter->finished_from_ms);
+    query_put_integer(query, upper(filter->finished_before_ms));
+    query_put_integer(query, filter->changed_from_ms);
+    query_put_integer(query, upper(filter->changed_before_ms));
+}
 
 /* Only the conditions that are asked for: each combination then finds its index. */
 static void list_text(const struct store_filter *filter, char ret[LIST_TEXT_BYTES])
@@ -164,9 +199,18 @@ static void list_text(const struct store_filter *filter, char ret[LIST_TEXT_BYTE
     (void)sqlite3_snprintf(
         LIST_TEXT_BYTES, ret,
         "SELECT %s FROM assessment a LEFT JOIN solution s ON s.rowid = a.solution "
-        "WHERE a.seq < ?%s%s%s ORDER BY a.seq DESC LIMIT ?",
+        "LEFT JOIN origin o ON o.assessment = a.seq "
+        "WHERE a.seq < ?%s%s%s%s%s%s ORDER BY a.seq DESC LIMIT ?",
         sqlite_assessment_columns, filter->subject == NULL ? "" : " AND a.subject = ?",
-        filter->side == NULL ? "" : " AND a.side = ?", filter->by_state ? " AND a.state = ?" : "");
+        filter->side == NULL ? "" : " AND a.side = ?", filter->by_state ? " AND a.state = ?" : "",
+        filter->states == 0 ? "" : " AND (1 << a.state & ?) <> 0",
+        !has_person(filter) ? ""
+                            : " AND a.seq IN (SELECT seq FROM assessment WHERE subject = ? UNION "
+                              "SELECT assessment FROM origin WHERE reference = ?)",
+        !has_times(filter) ? ""
+                           : " AND a.finished_ms >= ? AND a.finished_ms < ?"
+                             " AND max(a.created_ms, a.started_ms, a.finished_ms) >= ?"
+                             " AND max(a.created_ms, a.started_ms, a.finished_ms) < ?");
 }
 
 struct listing {
@@ -218,6 +262,7 @@ static enum ischia_code list_from(struct db *db, struct listing *listing, int64_
     if (filter->subject != NULL) query_put_text(&query, filter->subject);
     if (filter->side != NULL) query_put_text(&query, filter->side);
     if (filter->by_state) query_put_integer(&query, (int64_t)filter->state);
+    put_exchange_bounds(&query, filter);
     query_put_integer(&query, filter->limit + 1);
     const enum ischia_code code = show_rows(&query, listing, err);
     query_end(&query);

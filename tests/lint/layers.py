@@ -34,7 +34,8 @@ FOREIGN = {
     "lapacke.h": "solver/study/least_squares.c",
     "cjson/cJSON.h": "api/json.c",
     "microhttpd.h": "server/http/http.c",
-    "gnutls": "server/http/tls.c",
+    "gnutls": "server/",  # signatures in jose.c, TLS in hl7/link.c
+    "curl/curl.h": "server/outbound/web.c",
     "zlib.h": "server/",  # packs replies, and the fields that are kept (cli/field_blob.c)
     "sqlite3.h": "server/store/store_sqlite",
     "libpq-fe.h": "server/store/store_postgresql",

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_API_FHIR_DATE_H
+#define ISCHIA_API_FHIR_DATE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* The span of a FHIR date, dateTime or instant of any precision, in Unix milliseconds: from *ret_lo
+ * up to but not including *ret_hi. One without an offset is UTC. False when it is none. */
+bool fhir_date_span(const char *text, int64_t *ret_lo, int64_t *ret_hi);
+
+/* A date search parameter ("ge2026-03-01"; prefixes eq ge gt le lt sa eb) narrows the range
+ * [*lo, *hi); a hi of 0 is no bound. False when it is malformed or of another prefix. */
+bool fhir_date_narrow(const char *value, int64_t *lo, int64_t *hi);
+
+#endif

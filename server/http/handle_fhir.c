@@ -1,0 +1,517 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "api/fhir_date.h"
+#include "server/http/fhir_http.h"
+#include "server/http/query.h"
+#include "server/http/reply.h"
+#include "server/http/report.h"
+#include "server/http/routes.h"
+#include "server/intake.h"
+#include "server/metrics.h"
+
+/* Reading and searching under /fhir. Resources are made from the store's rows at each request. */
+
+enum { COUNT_USUAL = 50, VALUE_BYTES = 512 };
+
+/* ---------------------------------------------------------------------------- shared */
+
+void fhir_origin(const struct call *call, char ret[FHIR_BASE_BYTES])
+{
+    const char *configured = call->service->config.public_url;
+    const char *host = http_request_header(call->request, "Host");
+    const char *forwarded = http_request_header(call->request, "X-Forwarded-Proto");
+    const bool outside_tls =
+        call->service->config.behind_proxy && forwarded != NULL && strcmp(forwarded, "https") == 0;
+    if (configured[0] != '\0')
+        (void)snprintf(ret, FHIR_BASE_BYTES, "%.380s", configured);
+    else
+        (void)snprintf(ret, FHIR_BASE_BYTES, "%s://%.300s",
+                       call->request->tls || outside_tls ? "https" : "http",
+                       host == NULL ? "localhost" : host);
+}
+
+void fhir_base(const struct call *call, char ret[FHIR_BASE_BYTES])
+{
+    char origin[FHIR_BASE_BYTES];
+    fhir_origin(call, origin);
+    (void)snprintf(ret, FHIR_BASE_BYTES, "%.390s/fhir", origin);
+}
+
+int fhir_indent(const struct call *call)
+{
+    char value[8];
+    (void)query_find(call->request->query, "_pretty", value, sizeof value);
+    return strcmp(value, "true") == 0 ? 2 : 0;
+}
+
+void fhir_send(struct call *call, int status, struct json_out *out, struct http_response *ret)
+{
+    struct ischia_error err;
+    char *text = NULL;
+    size_t size = 0;
+    if (json_out_take(out, &text, &size, &err) != ISCHIA_OK) {
+        reply_failure(call->request, ret, &err);
+        return;
+    }
+    ret->status = status;
+    http_body(ret, call->route->gives[call->accepted], text, size);
+    ret->compressible = true;
+}
+
+bool fhir_get_row(struct call *call, struct store_assessment *ret_row, struct http_response *ret)
+{
+    struct ischia_error err;
+    enum store_answer answer = STORE_NOT_FOUND;
+    memset(ret_row, 0, sizeof *ret_row);
+    if (call->id_text[0] != '\0' &&
+        store_get(call->service->store, &call->id, ret_row, &answer, &err) != ISCHIA_OK) {
+        reply_failure(call->request, ret, &err);
+        return false;
+    }
+    if (answer != STORE_DONE) reply_no_assessment(call, ret);
+    return answer == STORE_DONE;
+}
+
+/* The report as an attachment for those that have ended, else "". */
+static enum ischia_code attach_report(char **ret, const struct store_assessment *row,
+                                      struct ischia_error *err)
+{
+    *ret = NULL;
+    return queue_is_final(row->state) ? report_attachment(ret, row, err) : ISCHIA_OK;
+}
+
+/* -------------------------------------------------------------------------- metadata */
+
+void handle_fhir_metadata(struct call *call, struct http_response *ret)
+{
+    struct json_out out;
+    char base[FHIR_BASE_BYTES];
+    fhir_base(call, base);
+    json_out_init(&out, fhir_indent(call));
+    json_open_object(&out, NULL);
+    fhir_put_capability_statement(&out, base);
+    json_close_object(&out);
+    http_header_static(ret, "Cache-Control", "no-cache");
+    fhir_send(call, 200, &out, ret);
+}
+
+/* ------------------------------------------------------------------------------ read */
+
+static enum fhir_type type_of(const struct route *route)
+{
+    const char *name = route->path + strlen("/fhir/");
+    for (int i = 0; i < FHIR_TYPE_COUNT; i++) {
+        const size_t length = strlen(fhir_type_names[i]);
+        if (strncmp(name, fhir_type_names[i], length) == 0 &&
+            (name[length] == '/' || name[length] == '\0'))
+            return (enum fhir_type)i;
+    }
+    return FHIR_TYPE_COUNT;
+}
+
+static void send_definition(struct call *call, enum fhir_type type, struct http_response *ret)
+{
+    struct json_out out;
+    bool found = type == FHIR_DEVICE && strcmp(call->rest, FHIR_DEVICE_ID) == 0;
+    json_out_init(&out, fhir_indent(call));
+    if (found) {
+        fhir_put_device(&out, NULL);
+    } else {
+        json_open_object(&out, NULL);
+        found = fhir_put_definition(&out, type, call->rest);
+        json_close_object(&out);
+    }
+    http_header_static(ret, "Cache-Control", "no-cache");
+    if (found) {
+        fhir_send(call, 200, &out, ret);
+        return;
+    }
+    json_out_finish(&out);
+    reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, "There is no such %s.",
+                  fhir_type_names[type]);
+}
+
+/* Which assessment the id in the path means, and which of its numbers. */
+static void find_id(struct call *call, enum fhir_type type, int *ret_measure)
+{
+    char id[ASSESSMENT_ID_BYTES];
+    const bool observation = type == FHIR_OBSERVATION;
+    if (observation && !fhir_observation_id(call->rest, id, ret_measure)) return;
+    if (uuid_parse(observation ? id : call->rest, &call->id)) uuid_format(&call->id, call->id_text);
+}
+
+/* False when the record has no such resource (yet). */
+static bool put_resource(struct json_out *out, enum fhir_type type, const struct record *record,
+                         int measure, const char *html)
+{
+    char digits[TEXT_NUMBER_BYTES];
+    if (type == FHIR_OBSERVATION && record_digits(record, measure, digits)[0] == '\0') return false;
+    if (type == FHIR_OBSERVATION) fhir_put_observation(out, NULL, record, measure);
+    if (type == FHIR_RISK_ASSESSMENT) fhir_put_risk_assessment(out, NULL, record);
+    if (type == FHIR_DIAGNOSTIC_REPORT) fhir_put_diagnostic_report(out, NULL, record, html, false);
+    if (type == FHIR_PROVENANCE) fhir_put_provenance(out, NULL, record);
+    return true;
+}
+
+static void put_version(const struct store_assessment *row, struct http_response *ret)
+{
+    const int64_t last = row->finished_ms > row->started_ms ? row->finished_ms : row->started_ms;
+    const time_t seconds = (time_t)((last > row->created_ms ? last : row->created_ms) / 1000);
+    struct tm parts;
+    char when[40];
+    (void)snprintf(ret->etag, sizeof ret->etag, "W/\"%lld\"", (long long)row->change_seq);
+    (void)gmtime_r(&seconds, &parts);
+    (void)strftime(when, sizeof when, "%a, %d %b %Y %H:%M:%S GMT", &parts);
+    http_header(ret, "Last-Modified", "%s", when);
+    http_header_static(ret, "Cache-Control", "no-cache, private");
+}
+
+static void send_resource(struct call *call, enum fhir_type type, int measure,
+                          const struct store_assessment *row, struct http_response *ret)
+{
+    struct ischia_error err;
+    struct json_out out;
+    char *html = NULL;
+    struct record *record = malloc(sizeof *record);
+    enum ischia_code code = record == NULL ? FAIL(&err, ISCHIA_E_MEMORY, "no memory for a record")
+                                           : intake_record(record, row, &err);
+    if (code == ISCHIA_OK && type == FHIR_DIAGNOSTIC_REPORT) code = attach_report(&html, row, &err);
+    json_out_init(&out, fhir_indent(call));
+    if (code != ISCHIA_OK) {
+        reply_failure(call->request, ret, &err);
+    } else if (put_resource(&out, type, record, measure, html == NULL ? "" : html)) {
+        put_version(row, ret);
+        if (!reply_not_modified(call->request, ret)) fhir_send(call, 200, &out, ret);
+    } else {
+        reply_refusal(call->request, ret, PROBLEM_NOT_FOUND,
+                      "This assessment has no such number (yet).");
+    }
+    json_out_finish(&out);
+    free(html);
+    free(record);
+}
+
+void handle_fhir_read(struct call *call, struct http_response *ret)
+{
+    struct store_assessment row;
+    const enum fhir_type type = type_of(call->route);
+    int measure = 0;
+    if (type >= FHIR_DEVICE) {
+        send_definition(call, type, ret);
+        return;
+    }
+    find_id(call, type, &measure);
+    if (!fhir_get_row(call, &row, ret)) return;
+    send_resource(call, type, measure, &row, ret);
+    store_assessment_finish(&row);
+}
+
+/* ---------------------------------------------------------------------------- search */
+
+struct search {
+    char person[VALUE_BYTES], reference[VALUE_BYTES], cursor[STORE_CURSOR_BYTES];
+    struct uuid id;
+    bool by_id, nothing; /* nothing: no row can match */
+    struct store_filter filter;
+    struct text_out query; /* what was understood, for links; without the cursor */
+    struct doc_faults faults;
+};
+
+static bool take_person(struct search *s, const char *value)
+{
+    const char *id = NULL;
+    if (s->person[0] != '\0' && strcmp(s->person, value) != 0) return false;
+    const bool local = fhir_is_local_patient(value, &id);
+    (void)snprintf(s->person, sizeof s->person, "%s", local ? id : value);
+    (void)snprintf(
+        s->reference, sizeof s->reference, "%s%.480s",
+        local || strchr(value, '/') != NULL || strchr(value, ':') != NULL ? "" : "Patient/", value);
+    s->filter.person[0] = s->person;
+    s->filter.person[1] = s->reference;
+    return value[0] != '\0';
+}
+
+static bool take_date(struct search *s, const char *value)
+{
+    return fhir_date_narrow(value, &s->filter.finished_from_ms, &s->filter.finished_before_ms);
+}
+
+static bool take_last_updated(struct search *s, const char *value)
+{
+    return fhir_date_narrow(value, &s->filter.changed_from_ms, &s->filter.changed_before_ms);
+}
+
+/* "final,cancelled", each perhaps behind its system and a '|'. */
+static bool take_status(struct search *s, const char *value)
+{
+    static const struct {
+        const char *word;
+        unsigned states;
+    } words[] = {
+        {"registered", 1U << QUEUE_QUEUED | 1U << QUEUE_RUNNING},
+        {"final", 1U << QUEUE_SUCCEEDED},
+        {"cancelled", 1U << QUEUE_FAILED | 1U << QUEUE_CANCELLED},
+        /* of the value sets too, but nothing of ours ever is */
+        {"partial", 0},
+        {"preliminary", 0},
+        {"amended", 0},
+        {"corrected", 0},
+        {"appended", 0},
+        {"entered-in-error", 0},
+        {"unknown", 0},
+    };
+    unsigned states = 0;
+    while (*value != '\0') {
+        const size_t length = strcspn(value, ",");
+        const char *bar = memchr(value, '|', length);
+        const char *word = bar == NULL ? value : bar + 1;
+        const size_t size = length - (size_t)(word - value);
+        bool found = false;
+        for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
+            if (strlen(words[i].word) != size || strncmp(words[i].word, word, size) != 0) continue;
+            states |= words[i].states;
+            found = true;
+        }
+        if (!found) return false;
+        value += length + (value[length] == ',');
+    }
+    s->nothing = s->nothing || states == 0;
+    s->filter.states = s->filter.states == 0 ? states : s->filter.states & states;
+    s->nothing = s->nothing || s->filter.states == 0;
+    return true;
+}
+
+static bool take_id(struct search *s, const char *value)
+{
+    s->by_id = uuid_parse(value, &s->id);
+    s->nothing = s->nothing || !s->by_id;
+    return true;
+}
+
+static bool take_count(struct search *s, const char *value)
+{
+    long long count;
+    if (!query_whole_number(value, 1, STORE_LIST_LIMIT_MAX, &count)) return false;
+    s->filter.limit = (int)count;
+    return true;
+}
+
+static bool take_cursor(struct search *s, const char *value)
+{
+    (void)snprintf(s->cursor, sizeof s->cursor, "%.39s", value);
+    s->filter.cursor = s->cursor;
+    return true;
+}
+
+static bool take_nothing(struct search *s, const char *value)
+{
+    (void)s, (void)value;
+    return true;
+}
+
+const char *const fhir_search_keys[] = {"subject",      "subject:Patient", "patient", "date",
+                                        "_lastUpdated", "status",          "_id",     "_count",
+                                        "_cursor",      "_format",         "_pretty", NULL};
+static bool (*const takers[])(struct search *s, const char *value) = {
+    take_person, take_person, take_person, take_date,    take_last_updated, take_status,
+    take_id,     take_count,  take_cursor, take_nothing, take_nothing};
+_Static_assert(sizeof takers / sizeof takers[0] + 1 ==
+                   sizeof fhir_search_keys / sizeof fhir_search_keys[0],
+               "each key has its taker");
+
+static void put_encoded(struct text_out *out, const char *text)
+{
+    static const char plain[] =
+        "-._~0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
+    char escape[4];
+    for (; *text != '\0'; text++) {
+        if (strchr(plain, *text) != NULL) {
+            text_put(out, text, 1);
+            continue;
+        }
+        (void)snprintf(escape, sizeof escape, "%%%02X", (unsigned)(unsigned char)*text);
+        text_put(out, escape, 3);
+    }
+}
+
+static void take_pair(struct search *s, const char *key, const char *value)
+{
+    for (int i = 0; fhir_search_keys[i] != NULL; i++) {
+        if (strcmp(fhir_search_keys[i], key) != 0) continue;
+        if (!takers[i](s, value))
+            doc_faults_add(&s->faults, key, "malformed", "%s has a value that is not accepted",
+                           key);
+        if (strcmp(key, "_cursor") == 0) return;
+        text_put_string(&s->query, s->query.length == 0 ? "" : "&");
+        put_encoded(&s->query, key);
+        text_put_string(&s->query, "=");
+        put_encoded(&s->query, value);
+        return;
+    }
+    /* Under Prefer: handling=lenient the route has let it pass; a form's body is not looked at. */
+    s->faults.dropped++;
+}
+
+static void take_pairs(struct search *s, const char *pairs)
+{
+    char key[64], value[VALUE_BYTES];
+    for (;;) {
+        const enum query_answer answer = query_next(&pairs, key, sizeof key, value, sizeof value);
+        if (answer == QUERY_ABSENT) return;
+        if (answer == QUERY_FOUND)
+            take_pair(s, key, value);
+        else
+            doc_faults_add(&s->faults, "query", "malformed",
+                           "a parameter is too long or cannot be decoded");
+    }
+}
+
+/* False: ret is the refusal. */
+static bool read_search(struct call *call, struct search *s, struct http_response *ret)
+{
+    struct problem problem;
+    const char *prefer = http_request_header(call->request, "Prefer");
+    const bool lenient = prefer != NULL && strstr(prefer, "handling=lenient") != NULL;
+    memset(s, 0, sizeof *s);
+    text_out_init(&s->query);
+    doc_faults_init(&s->faults);
+    s->filter.limit = COUNT_USUAL;
+    s->filter.with_results = true;
+    take_pairs(s, call->request->query);
+    char *form = strndup(call->request->body, call->request->body_size);
+    if (form != NULL) take_pairs(s, form);
+    free(form);
+    if (s->faults.dropped > 0 && !lenient)
+        doc_faults_add(&s->faults, "query", "unsupported",
+                       "a search parameter is not known here; Prefer: handling=lenient ignores it");
+    if (s->faults.count == 0) return true;
+    problem_init(&problem, PROBLEM_BAD_REQUEST, "The search is not acceptable.");
+    problem.faults = s->faults;
+    reply_problem(call->request, &problem, ret);
+    return false;
+}
+
+struct page {
+    struct json_out out;
+    enum fhir_type type;
+    const char *base;
+    struct record *record;
+    int count;
+    enum ischia_code code;
+    struct ischia_error err;
+};
+
+static bool write_entry(void *context, const struct store_assessment *row)
+{
+    struct page *page = context;
+    char url[FHIR_BASE_BYTES + 80], *html = NULL;
+    page->code = intake_record(page->record, row, &page->err);
+    if (page->code == ISCHIA_OK && page->type == FHIR_DIAGNOSTIC_REPORT)
+        page->code = attach_report(&html, row, &page->err);
+    if (page->code != ISCHIA_OK) return false;
+    (void)snprintf(url, sizeof url, "%s/%s/%s", page->base, fhir_type_names[page->type],
+                   page->record->id);
+    json_open_object(&page->out, NULL);
+    json_put_string(&page->out, "fullUrl", url);
+    if (page->type == FHIR_RISK_ASSESSMENT)
+        fhir_put_risk_assessment(&page->out, "resource", page->record);
+    else
+        fhir_put_diagnostic_report(&page->out, "resource", page->record, html == NULL ? "" : html,
+                                   false);
+    json_open_object(&page->out, "search");
+    json_put_string(&page->out, "mode", "match");
+    json_close_object(&page->out);
+    json_close_object(&page->out);
+    free(html);
+    page->count++;
+    return true;
+}
+
+static void put_link(struct page *page, const char *relation, const struct search *s,
+                     const char *cursor)
+{
+    struct text_out url;
+    text_out_init(&url);
+    text_put_string(&url, page->base);
+    text_put_string(&url, "/");
+    text_put_string(&url, fhir_type_names[page->type]);
+    if (s->query.length > 0 || cursor[0] != '\0') text_put_string(&url, "?");
+    if (s->query.length > 0) text_put_string(&url, s->query.text);
+    if (cursor[0] != '\0') {
+        text_put_string(&url, s->query.length > 0 ? "&_cursor=" : "_cursor=");
+        text_put_string(&url, cursor);
+    }
+    json_open_object(&page->out, NULL);
+    json_put_string(&page->out, "relation", relation);
+    json_put_string(&page->out, "url", url.text == NULL ? page->base : url.text);
+    json_close_object(&page->out);
+    page->out.text.failed = page->out.text.failed || url.failed;
+    text_out_finish(&url);
+}
+
+static enum ischia_code one_entry(struct call *call, const struct search *s, struct page *page)
+{
+    struct store_assessment row;
+    enum store_answer answer = STORE_NOT_FOUND;
+    memset(&row, 0, sizeof row);
+    TRY(store_get(call->service->store, &s->id, &row, &answer, &page->err));
+    if (answer == STORE_DONE) (void)write_entry(page, &row);
+    store_assessment_finish(&row);
+    return page->code;
+}
+
+static enum ischia_code write_bundle(struct call *call, const struct search *s, struct page *page)
+{
+    char cursor[STORE_CURSOR_BYTES] = "";
+    json_open_object(&page->out, NULL);
+    json_put_string(&page->out, "resourceType", "Bundle");
+    json_put_string(&page->out, "type", "searchset");
+    json_open_array(&page->out, "entry");
+    if (s->by_id && !s->nothing)
+        TRY(one_entry(call, s, page));
+    else if (!s->nothing)
+        TRY(store_list(call->service->store, &s->filter, write_entry, page, cursor, &page->err));
+    TRY(page->code);
+    json_close_array(&page->out);
+    if (cursor[0] == '\0' && s->cursor[0] == '\0')
+        json_put_integer(&page->out, "total", page->count);
+    json_open_array(&page->out, "link");
+    put_link(page, "self", s, s->cursor);
+    if (cursor[0] != '\0') put_link(page, "next", s, cursor);
+    json_close_array(&page->out);
+    json_close_object(&page->out);
+    return ISCHIA_OK;
+}
+
+static void send_page(struct call *call, const struct search *s, struct http_response *ret)
+{
+    char base[FHIR_BASE_BYTES];
+    struct page page = {.type = type_of(call->route), .base = base, .code = ISCHIA_OK};
+    fhir_base(call, base);
+    page.record = malloc(sizeof *page.record);
+    json_out_init(&page.out, fhir_indent(call));
+    const enum ischia_code code = page.record == NULL
+                                      ? FAIL(&page.err, ISCHIA_E_MEMORY, "no memory for a record")
+                                      : write_bundle(call, s, &page);
+    http_header_static(ret, "Cache-Control", "no-store");
+    if (code == ISCHIA_OK)
+        fhir_send(call, 200, &page.out, ret);
+    else if (code == ISCHIA_E_INPUT && s->cursor[0] != '\0')
+        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, "%s", page.err.message);
+    else
+        reply_failure(call->request, ret, &page.err);
+    json_out_finish(&page.out);
+    free(page.record);
+}
+
+void handle_fhir_search(struct call *call, struct http_response *ret)
+{
+    struct search s;
+    const int64_t begun_us = metrics_now_us();
+    if (read_search(call, &s, ret)) send_page(call, &s, ret);
+    text_out_finish(&s.query);
+    metrics_store(STORE_LISTS, (double)(metrics_now_us() - begun_us) / 1e6);
+}

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef ISCHIA_SERVER_TEXTFILE_H
+#define ISCHIA_SERVER_TEXTFILE_H
+
+#include "solver/error.h"
+
+/* The whole of a small file (keys, certificates, secrets: at most 256 KiB), NUL-terminated, the
+ * caller's to free. ISCHIA_E_IO with the path: it cannot be read, is empty, or is too large. */
+ISCHIA_MUST_CHECK enum ischia_code textfile_read(const char *path, char **ret,
+                                                 struct ischia_error *err);
+
+#endif
