@@ -12,8 +12,8 @@ static const size_t quantities[] = {
 };
 enum { QUANTITY_COUNT = sizeof quantities / sizeof quantities[0] };
 
-/* A dense point this close to one of the finer curve's, over its force, says nothing new. */
-static const double same_force = 0.01;
+/* A dense point this close to an end of the step it lies in, over the step, says nothing new. */
+static const double margin = 0.15;
 
 static double *quantity(struct ischia_load_point *p, int q)
 {
@@ -69,9 +69,9 @@ static void add_between(struct load_curve *ret, const struct load_curve *dense,
     const struct ischia_load_point at_a = difference(a, dense), at_b = difference(b, dense);
     for (int i = 0; i < dense->count; i++) {
         struct ischia_load_point p = dense->point[i];
-        if (p.F_N < a->F_N * (1 + same_force) || p.F_N > b->F_N * (1 - same_force)) continue;
-        const struct ischia_load_point shift =
-            mix(&at_a, &at_b, (p.F_N - a->F_N) / (b->F_N - a->F_N));
+        const double t = (p.F_N - a->F_N) / (b->F_N - a->F_N);
+        if (!(t > margin && t < 1 - margin)) continue;
+        const struct ischia_load_point shift = mix(&at_a, &at_b, t);
         for (int q = 0; q < QUANTITY_COUNT; q++) *quantity(&p, q) += value(&shift, q);
         load_curve_add(ret, &p);
     }

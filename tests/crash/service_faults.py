@@ -156,6 +156,10 @@ class Workers(unittest.TestCase):
             identity = service.submit(wait=0, F=HANG)["id"]
             for kill in range(2):  # the first time it is tried again
                 service.until(identity, "running")
+                # one that dies before it has said hello has not tried
+                eventually(lambda tries=kill: service.errors().count('"worker ready"') > tries,
+                           "the worker to be ready")
+                time.sleep(0.2)  # and to have taken the job
                 died = metric(service, "ischia_worker_deaths_total")
                 victim = eventually(lambda: workers_of(service.process.pid), "a worker")[0]
                 os.kill(victim, signal.SIGKILL)

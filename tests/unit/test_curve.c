@@ -73,7 +73,8 @@ static void forces_only_rise(void **state)
 static void refinement_carries_the_difference_on(void **state)
 {
     (void)state;
-    static const double fine_N[] = {8, 20, 40};
+    static const double fine_N[] = {8, 20, 32};
+    static const double expected_N[] = {2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30, 32};
     struct load_curve fine = {.count = 0}, dense = {.count = 0};
     for (int i = 1; i <= 20; i++) {
         const struct ischia_load_point p = dense_at(2 * i);
@@ -84,11 +85,30 @@ static void refinement_carries_the_difference_on(void **state)
         load_curve_add(&fine, &p);
     }
     load_curve_refine(&fine, &dense);
-    assert_int_equal(fine.count, 20); /* each once: three are the fine curve's own */
+    assert_int_equal(fine.count, 16); /* each once: three are the fine curve's own */
     for (int i = 0; i < fine.count; i++) {
-        const struct ischia_load_point expected = shifted_at(2 * (i + 1));
+        const struct ischia_load_point expected = shifted_at(expected_N[i]);
         same_point(&fine.point[i], &expected);
     }
+}
+
+/* No two points that say the same. */
+static void dense_points_beside_a_fine_one_are_left_out(void **state)
+{
+    (void)state;
+    static const double dense_N[] = {1, 9, 10.5, 15, 19.5};
+    struct load_curve fine = {.count = 0}, dense = {.count = 0};
+    for (int i = 0; i < 5; i++) {
+        const struct ischia_load_point p = dense_at(dense_N[i]);
+        load_curve_add(&dense, &p);
+    }
+    for (int i = 1; i <= 2; i++) {
+        const struct ischia_load_point p = shifted_at(10 * i);
+        load_curve_add(&fine, &p);
+    }
+    load_curve_refine(&fine, &dense);
+    assert_int_equal(fine.count, 3);
+    assert_near(fine.point[1].F_N, 15, 1e-15);
 }
 
 static void nothing_to_refine_with_changes_nothing(void **state)
@@ -108,6 +128,7 @@ int main(void)
         cmocka_unit_test(between_points_it_is_linear_from_rest_on),
         cmocka_unit_test(forces_only_rise),
         cmocka_unit_test(refinement_carries_the_difference_on),
+        cmocka_unit_test(dense_points_beside_a_fine_one_are_left_out),
         cmocka_unit_test(nothing_to_refine_with_changes_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
