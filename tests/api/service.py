@@ -124,8 +124,8 @@ class Service:
         assert answer.status in (201, 202), (answer.status, answer.body)
         return answer.json()
 
-    def until(self, identity, *statuses):
-        end = time.monotonic() + PATIENCE_S
+    def until(self, identity, *statuses, seconds=PATIENCE_S):
+        end = time.monotonic() + seconds
         while time.monotonic() < end:
             document = self.get(f'/v1/assessments/{identity}').json()
             if document['status'] in statuses:

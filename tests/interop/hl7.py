@@ -134,7 +134,7 @@ class Peer(threading.Thread):
         answer = f'MSH|^~\\&|EHR|||||| ACK|1|P|2.5.1\rMSA|{code}|{control_id}\r'
         connection.sendall(VT + answer.encode() + FS)
 
-    def wait(self, count, seconds=20):
+    def wait(self, count, seconds=120):
         end = time.monotonic() + seconds
         while len(self.messages) < count:
             assert time.monotonic() < end, f'{len(self.messages)} of {count} arrived'

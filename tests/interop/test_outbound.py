@@ -59,7 +59,7 @@ class Receiver(threading.Thread):
     def taken(self):
         return [r for r in self.requests if r[0] in (200, 201)]
 
-    def wait(self, count, seconds=30):
+    def wait(self, count, seconds=120):
         end = time.monotonic() + seconds
         while len(self.taken()) < count:
             assert time.monotonic() < end, f'{len(self.taken())} of {count} arrived'
