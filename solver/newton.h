@@ -41,7 +41,6 @@ struct newton_report {
 
 struct newton; /* work space for one body: directions, gradients, masks */
 
-/* Body, assembly and seat stay the caller's and must outlive it. ISCHIA_E_MEMORY. */
 /* Work space for these; they stay the caller's and must outlive it. ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code newton_create(struct newton **ret, struct body *body,
                                                  struct assembly *assembly, struct seat *seat,
