@@ -262,7 +262,10 @@ static void test_closed_socket(void **state)
 static void test_memory_limit(void **state)
 {
     (void)state;
-    if (SANITIZED) skip(); /* a sanitizer's own memory is beyond any sensible limit */
+    if (SANITIZED) {
+        print_message("skipped: a sanitizer's own memory is beyond any sensible limit\n");
+        skip();
+    }
     expect_end("{\"do\":\"memory\"}", POOL_PROBLEM, "memory", 0);
 }
 
