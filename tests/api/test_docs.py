@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 import unittest
 
-from service import HERE, PATIENCE_S, PROGRAM, Service
+from service import HERE, PATIENCE_S, PROGRAM, PROXY, Service
 
 ROOT = os.path.join(HERE, '../..')
 
@@ -48,10 +48,14 @@ class Docs(unittest.TestCase):
             service.until_ready()
             environment = {
                 **os.environ,
-                'ISCHIA': 'http://' + service.address,
+                'ISCHIA': service.origin,
+                'CURL_HOME': folder,
                 'ID': service.submit(F=250.5, subject='P-017', side='left')['id'],
                 'RUNNING': service.submit(wait=0, F=599)['id'],
             }
+            if PROXY:  # as a user would: once, for all that follow
+                with open(os.path.join(folder, '.curlrc'), 'w', encoding='utf-8') as file:
+                    file.write(service.curl_options())
             lines = sorted(curl_lines(), key=lambda line: '/cancel' not in line)
             for line in lines:
                 done = subprocess.run(
