@@ -105,7 +105,7 @@ class Walk:
         state = os.path.join(self.folder, 'state')
         os.mkdir(state)
         os.chown(state, *map(int, self.user))
-        run('mount', '--bind', self.root, self.root)
+        run('mount', '--rbind', self.root, self.root)  # with its /proc
         run('mount', '--bind', state, os.path.join(self.root, 'var/lib/ischia'))
         run('mount', '-o', 'remount,bind,ro', self.root)
         with open(os.path.join(self.folder, 'log'), 'wb') as log:
