@@ -121,7 +121,7 @@ async function write_pages() {
   const template = await readFile(join(here, 'index.html'), 'utf8');
   const files = (await readdir(join(here, '../words'))).filter((f) => f.endsWith('.json'));
   const all = {};
-  for (const file of files.sort())
+  for (const file of ['en.json', ...files.filter((f) => f !== 'en.json').sort()])
     all[file.slice(0, -5)] = JSON.parse(await readFile(join(here, '../words', file), 'utf8'));
   for (const tag of Object.keys(all))
     await writeFile(

@@ -10,7 +10,7 @@ import fr from '../../words/fr.json';
 export type Key = Exclude<keyof typeof en, `daemon.${string}`>;
 export type Strings = Record<keyof typeof en, string>;
 
-const languages = { en, fr, de } satisfies Record<string, Strings>;
+const languages = { en, de, fr } satisfies Record<string, Strings>;
 export type Language = keyof typeof languages;
 export const language_names = Object.fromEntries(
   Object.entries(languages).map(([code, words]) => [code, words['language.name']]),
