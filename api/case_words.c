@@ -33,7 +33,8 @@ static const char *const codes[ISCHIA_CASE_FAULT_KIND_COUNT] = {
 
 const char *case_spaced_unit(const char *unit, char buffer[16])
 {
-    (void)snprintf(buffer, 16, strcmp(unit, "1") == 0 ? "" : " %s", unit);
+    if (strcmp(unit, "1") == 0) return "";
+    (void)snprintf(buffer, 16, " %s", unit);
     return buffer;
 }
 

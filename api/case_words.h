@@ -26,7 +26,7 @@ void case_fault_words(struct ischia_fault *ret, enum language language, const st
 size_t case_warnings(const struct ischia_case *c, enum language language,
                      struct ischia_fault ret_warnings[ISCHIA_PARAM_COUNT]);
 
-/* "" for the unit of a number without one, otherwise a blank and the unit. Returns buffer. */
+/* "" for the unit of a number without one, otherwise a blank and the unit (in buffer). */
 const char *case_spaced_unit(const char *unit, char buffer[16]);
 
 #endif

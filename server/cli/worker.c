@@ -212,34 +212,23 @@ static const struct {
     drawing_writer *writer;
 } drawings[] = {{"vtu", write_vtu}, {"svg", section_write}};
 
-/* A drawing that was ordered. */
-struct drawing {
-    drawing_writer *writer;
-    enum language language;
-};
-
-static enum ischia_code read_order(struct drawing *ret, const struct message *order,
-                                   struct ischia_error *err)
+static drawing_writer *find_writer(const char *as)
 {
-    ret->writer = NULL;
     for (size_t i = 0; i < sizeof drawings / sizeof drawings[0]; i++)
-        if (strcmp(drawings[i].as, order->as) == 0) ret->writer = drawings[i].writer;
-    CHECK(ret->writer != NULL, err, ISCHIA_E_INPUT, "no drawing of the kind %s", order->as);
-    CHECK(words_language(order->language, &ret->language), err, ISCHIA_E_INPUT,
-          "no words of the language %s", order->language);
-    return ISCHIA_OK;
+        if (strcmp(drawings[i].as, as) == 0) return drawings[i].writer;
+    return NULL;
 }
 
 /* Draws into memory: a worker has no files. *ret_text is the caller's to free. */
-static enum ischia_code draw(const struct drawing *drawing, const struct ischia_case *c,
-                             const struct ischia_field *field, char **ret_text, size_t *ret_size,
-                             struct ischia_error *err)
+static enum ischia_code draw(drawing_writer *writer, enum language language,
+                             const struct ischia_case *c, const struct ischia_field *field,
+                             char **ret_text, size_t *ret_size, struct ischia_error *err)
 {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     CHECK(out != NULL, err, ISCHIA_E_MEMORY, "no memory for a drawing");
-    enum ischia_code code = drawing->writer(out, c, field, drawing->language, err);
+    enum ischia_code code = writer(out, c, field, language, err);
     if (fclose(out) != 0 && code == ISCHIA_OK)
         code = FAIL(err, ISCHIA_E_MEMORY, "no memory for a drawing");
     if (code != ISCHIA_OK) {
@@ -255,12 +244,15 @@ static enum ischia_code draw_blob(const struct message *order, const struct isch
                                   const struct frame *blob, char **ret_text, size_t *ret_size,
                                   struct ischia_error *err)
 {
-    struct drawing drawing;
+    drawing_writer *writer = find_writer(order->as);
+    enum language language;
     struct ischia_field field = {0};
-    TRY(read_order(&drawing, order, err));
+    CHECK(writer != NULL, err, ISCHIA_E_INPUT, "no drawing of the kind %s", order->as);
+    CHECK(words_language(order->language, &language), err, ISCHIA_E_INPUT,
+          "no words of the language %s", order->language);
     TRY(field_blob_decode((const unsigned char *)blob->bytes, blob->size, &field.displacement_mm,
                           &field.node_count, err));
-    const enum ischia_code code = draw(&drawing, c, &field, ret_text, ret_size, err);
+    const enum ischia_code code = draw(writer, language, c, &field, ret_text, ret_size, err);
     free(field.displacement_mm);
     return code;
 }

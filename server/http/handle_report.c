@@ -138,15 +138,15 @@ static void put_strains(const struct report *r, const struct ischia_result *resu
 static void put_seat(const struct report *r, const struct ischia_seat *seat)
 {
     const struct {
-        enum word name;
-        const char *unit;
-        int decimals;
         double value;
+        const char *unit;
+        enum word name;
+        int decimals;
     } rows[] = {
-        {WORD_DAEMON_REPORT_TRAVEL, "mm", 1, seat->displacement_mm},
-        {WORD_DAEMON_REPORT_AREA, "mm\u00b2", 0, seat->contact_area_mm2},
-        {WORD_DAEMON_REPORT_MEAN_PRESSURE, "kPa", 1, seat->mean_pressure_kPa},
-        {WORD_DAEMON_REPORT_PEAK_PRESSURE, "kPa", 1, seat->peak_pressure_kPa},
+        {seat->displacement_mm, "mm", WORD_DAEMON_REPORT_TRAVEL, 1},
+        {seat->contact_area_mm2, "mm\u00b2", WORD_DAEMON_REPORT_AREA, 0},
+        {seat->mean_pressure_kPa, "kPa", WORD_DAEMON_REPORT_MEAN_PRESSURE, 1},
+        {seat->peak_pressure_kPa, "kPa", WORD_DAEMON_REPORT_PEAK_PRESSURE, 1},
     };
     begin_table(r, WORD_VIEW_SEAT);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {

@@ -198,7 +198,7 @@ static double language_quality(const char *accept_language, const char *tag)
             best = quality > best ? quality : best;
             named = true;
         } else if (primary == 1 && at[0] == '*') {
-            others = quality;
+            others = quality > others ? quality : others;
         }
         at += length;
     }
