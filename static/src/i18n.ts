@@ -46,6 +46,9 @@ export const language = (): Language => current;
 export function set_language(next: Language): void {
   current = next;
   document.documentElement.lang = next;
+  const address = new URL(window.location.href);
+  address.searchParams.delete('lang'); /* what is chosen now holds, also after a reload */
+  if (asked() !== null) history.replaceState(null, '', address);
   try {
     localStorage.setItem(storage_key, next);
   } catch {
