@@ -151,10 +151,8 @@ static bool refuse_user(struct call *call, struct http_response *ret)
     metrics_count(METRIC_REFUSED_AUTH);
     (void)audit_change(call->service->audit, "-", "access", call->id_text, "401");
     http_header_static(ret, "WWW-Authenticate", "Bearer realm=\"ischia\"");
-    reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED,
-                  "The reverse proxy names nobody that can be: one name of at most %d letters, "
-                  "digits and ._@+-\\ is expected in %s.",
-                  AUTH_USER_MAX, call->service->config.user_header);
+    reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED, WORD_DAEMON_REFUSAL_USER,
+                  WORDS(word_text("header", call->service->config.user_header)));
     return false;
 }
 
