@@ -60,6 +60,16 @@ const struct ischia_preset ischia_presets[] = {
       [ISCHIA_FRICTION] = 0.4,
       [ISCHIA_R2_SURFACE] = 0,
       [ISCHIA_EMBED_OVER_R1] = 1}},
+    {"as-published",
+     "Slightly compressible tissue (Poisson's ratio near 0.48), the reading that comes nearest to "
+     "the coefficients the paper prints.",
+     {[ISCHIA_SKIN_MU] = 67,
+      [ISCHIA_SKIN_THICKNESS] = 1,
+      [ISCHIA_L_OVER_H] = 2,
+      [ISCHIA_BULK_RATIO] = 30,
+      [ISCHIA_FRICTION] = 0.4,
+      [ISCHIA_R2_SURFACE] = 0,
+      [ISCHIA_EMBED_OVER_R1] = 1}},
 };
 const size_t ischia_preset_count = sizeof ischia_presets / sizeof ischia_presets[0];
 

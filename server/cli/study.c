@@ -53,6 +53,24 @@ int study_failed(const char *what, const struct ischia_error *err)
     return bad_input ? EXIT_BAD_INPUT : EXIT_SOLVE_FAILED;
 }
 
+enum ischia_code study_load_plan(struct study_plan *ret, const char *path,
+                                 const struct case_doc_defaults *defaults, struct ischia_error *err)
+{
+    struct doc_faults faults;
+    char *text;
+    size_t length;
+    doc_faults_init(&faults);
+    TRY(file_read(path, STUDY_PLAN_BYTES_MAX, &text, &length, err));
+    const enum ischia_code code =
+        study_plan_read(ret, text, length, defaults, DESIGN_ROWS_MAX, &faults, err);
+    free(text);
+    for (size_t i = 0; i < faults.count; i++)
+        (void)fprintf(stderr, "%s: %s\n", faults.item[i].pointer, faults.item[i].detail);
+    TRY(code);
+    CHECK(faults.count == 0, err, ISCHIA_E_INPUT, "%s is not a design that can be run", path);
+    return ISCHIA_OK;
+}
+
 int study_usage(const char *what, const char *usage)
 {
     (void)fprintf(stderr, "%s`ischia study %s --help` says more.\n", usage, what);

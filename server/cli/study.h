@@ -2,6 +2,7 @@
 #ifndef ISCHIA_SERVER_CLI_STUDY_H
 #define ISCHIA_SERVER_CLI_STUDY_H
 
+#include "api/study_plan.h"
 #include "api/text.h"
 #include "server/cli/command.h"
 #include "solver/error.h"
@@ -14,6 +15,12 @@ int study_compare(int argc, char **argv);
 
 /* Prints "ischia study WHAT: message" on stderr and returns the exit status that fits the code. */
 int study_failed(const char *what, const struct ischia_error *err);
+
+/* Reads a design file and makes its points; its faults are printed on stderr, one a line.
+ * ISCHIA_E_INPUT when there are any; else as file_read and study_plan_read. */
+ISCHIA_MUST_CHECK enum ischia_code study_load_plan(struct study_plan *ret, const char *path,
+                                                   const struct case_doc_defaults *defaults,
+                                                   struct ischia_error *err);
 
 /* Prints a hint at the usage on stderr and returns EXIT_BAD_INPUT. */
 int study_usage(const char *what, const char *usage);

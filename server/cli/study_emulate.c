@@ -14,8 +14,8 @@
 #include <string.h>
 
 #include "api/json.h"
+#include "api/study_plan.h"
 #include "server/cli/study.h"
-#include "server/cli/study_plan.h"
 #include "server/cli/study_published.h"
 #include "server/cli/study_table.h"
 #include "solver/study/emulator.h"
@@ -84,13 +84,9 @@ static enum ischia_code factors_from_columns(struct emulation *e, struct ischia_
 
 static enum ischia_code factors_from_design(struct emulation *e, struct ischia_error *err)
 {
+    const struct case_doc_defaults defaults = {NULL, NULL};
     struct study_plan plan;
-    struct text_out faults;
-    text_out_init(&faults);
-    const enum ischia_code code = study_plan_init(&plan, e->arguments->design, &faults, err);
-    if (faults.length > 0) (void)fputs(faults.text, stderr);
-    text_out_finish(&faults);
-    TRY(code);
+    TRY(study_load_plan(&plan, e->arguments->design, &defaults, err));
     e->factor_count = plan.design.factor_count;
     memcpy(e->factor, plan.design.factor, sizeof e->factor);
     study_plan_finish(&plan);

@@ -13,14 +13,15 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "api/study_plan.h"
 #include "server/cli/bar.h"
 #include "server/cli/crew.h"
 #include "server/cli/study.h"
 #include "server/cli/study_journal.h"
-#include "server/cli/study_plan.h"
 
 static const char usage[] =
-    "usage: ischia study factorial DESIGN.json -o OUT.csv [-j N] [--shard I/N] [--quiet]\n"
+    "usage: ischia study factorial DESIGN.json -o OUT.csv [-j N] [--shard I/N] [--model NAME]\n"
+    "                              [--resolution NAME] [--quiet]\n"
     "       ischia study factorial DESIGN.json --points [-o POINTS.csv]\n";
 static const char help[] =
     "\nSolves every point of a design: one row of OUT.csv for each, with status and reason.\n"
@@ -28,6 +29,9 @@ static const char help[] =
     "the\n"
     "                     same command goes on where it was stopped, even by kill -9\n"
     "  -j, --jobs N       solve N rows at a time (default: one a processor)\n"
+    "      --model NAME   solve with a named set of model options (as-published), for a design\n"
+    "                     that does not say\n"
+    "      --resolution NAME  standard, fine or coarse, likewise\n"
     "      --shard I/N    solve rows I, I+N, I+2N, ... only; `ischia study merge` joins the "
     "shards\n"
     "      --points       write the points and solve nothing\n"
@@ -37,6 +41,7 @@ static const char help[] =
 struct arguments {
     const char *design;
     const char *output;
+    struct case_doc_defaults defaults;
     int jobs;
     size_t shard, shards; /* shard: 0 ... shards - 1 */
     bool points, quiet;
@@ -99,6 +104,8 @@ static bool parse_arguments(int argc, char **argv, struct arguments *a, bool *re
     static const struct option options[] = {{"output", required_argument, NULL, 'o'},
                                             {"jobs", required_argument, NULL, 'j'},
                                             {"shard", required_argument, NULL, 's'},
+                                            {"model", required_argument, NULL, 'm'},
+                                            {"resolution", required_argument, NULL, 'r'},
                                             {"points", no_argument, NULL, 'p'},
                                             {"quiet", no_argument, NULL, 'q'},
                                             {"help", no_argument, NULL, 'h'},
@@ -117,6 +124,12 @@ static bool parse_arguments(int argc, char **argv, struct arguments *a, bool *re
             break;
         case 's':
             good = parse_shard(optarg, a);
+            break;
+        case 'm':
+            a->defaults.model = optarg;
+            break;
+        case 'r':
+            a->defaults.resolution = optarg;
             break;
         case 'p':
             a->points = true;
@@ -228,6 +241,17 @@ static enum ischia_code add_row(struct study *s, size_t row, double wall_s, stru
     return code;
 }
 
+static void put_answer(struct text_out *out, const struct crew_answer *answer,
+                       const struct study_plan *plan)
+{
+    const struct ischia_numerics *numerics = &answer->result.numerics;
+    const bool solved = answer->code == ISCHIA_OK;
+    study_response_put(
+        out, solved ? &answer->result : NULL,
+        solved ? ischia_reason_name(numerics->reason) : ischia_code_name(answer->code),
+        solved ? numerics->detail : answer->message, plan->response, plan->response_count);
+}
+
 /* A row whose process died (killed for memory, say) is solved once more before it fails. */
 static enum ischia_code row_answered(struct study *s, const struct crew_answer *answer,
                                      struct ischia_error *err)
@@ -242,7 +266,7 @@ static enum ischia_code row_answered(struct study *s, const struct crew_answer *
         return crew_give(&s->crew, answer->job, &c, err);
     }
     text_out_init(&text);
-    study_response_put(&text, answer, s->plan.response, s->plan.response_count);
+    put_answer(&text, answer, &s->plan);
     return add_row(s, row, answer->result.numerics.wall_s, &text, err);
 }
 
@@ -360,7 +384,6 @@ int study_factorial(int argc, char **argv)
     struct arguments arguments;
     struct study study = {.arguments = &arguments};
     struct ischia_error err;
-    struct text_out faults;
     bool want_help;
     if (!parse_arguments(argc, argv, &arguments, &want_help))
         return study_usage("factorial", usage);
@@ -368,10 +391,8 @@ int study_factorial(int argc, char **argv)
         (void)printf("%s%s", usage, help);
         return EXIT_DONE;
     }
-    text_out_init(&faults);
-    enum ischia_code code = study_plan_init(&study.plan, arguments.design, &faults, &err);
-    if (faults.length > 0) (void)fputs(faults.text, stderr);
-    text_out_finish(&faults);
+    enum ischia_code code =
+        study_load_plan(&study.plan, arguments.design, &arguments.defaults, &err);
     if (code == ISCHIA_OK) {
         code = arguments.points ? write_points(&study, &err) : run_study(&study, &err);
         study_plan_finish(&study.plan);

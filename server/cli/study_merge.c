@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/study_plan.h"
 #include "server/cli/files.h"
 #include "server/cli/study.h"
-#include "server/cli/study_plan.h"
 
 enum { SHARD_BYTES_MAX = 1 << 28 };
 
@@ -117,7 +117,7 @@ int study_merge(int argc, char **argv)
                                             {NULL, 0, NULL, 0}};
     struct merge merge = {.header = NULL};
     struct ischia_error err;
-    struct text_out faults;
+    const struct case_doc_defaults defaults = {NULL, NULL};
     const char *output = NULL;
     optind = 0;
     for (int c; (c = getopt_long(argc, argv, "o:h", options, NULL)) != -1;) {
@@ -126,10 +126,7 @@ int study_merge(int argc, char **argv)
         output = optarg;
     }
     if (optind + 2 > argc || output == NULL) return study_usage("merge", usage);
-    text_out_init(&faults);
-    enum ischia_code code = study_plan_init(&merge.plan, argv[optind], &faults, &err);
-    if (faults.length > 0) (void)fputs(faults.text, stderr);
-    text_out_finish(&faults);
+    enum ischia_code code = study_load_plan(&merge.plan, argv[optind], &defaults, &err);
     if (code == ISCHIA_OK)
         code = run_merge(&merge, argv + optind + 1, argc - optind - 1, output, &err);
     merge_finish(&merge);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "server/cli/cohort_rows.h"
+#include "api/cohort_rows.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -102,26 +102,26 @@ void cohort_columns_finish(struct cohort_columns *columns)
     columns->header = NULL;
 }
 
-static void read_case(const struct cohort_columns *columns, const struct cohort_defaults *defaults,
-                      const struct csv_row *row, struct ischia_case *ret, struct doc_faults *faults)
+static void read_case(const struct cohort_columns *columns,
+                      const struct case_doc_defaults *defaults, const struct csv_row *row,
+                      struct ischia_request *ret, struct doc_faults *faults)
 {
-    struct ischia_request request;
     struct case_doc_fields fields;
-    case_doc_fields_init(&fields, &request, faults);
+    const struct case_doc_defaults missing = {
+        column_of(columns, "resolution") < 0 ? defaults->resolution : NULL,
+        column_of(columns, "model") < 0 ? defaults->model : NULL,
+    };
+    case_doc_fields_init(&fields, ret, faults);
+    case_doc_fields_set_defaults(&fields, &missing);
     for (int i = 0; i < columns->count && i < row->count; i++)
         if (columns->key[i] != NULL) case_doc_fields_set(&fields, columns->key[i], row->field[i]);
-    if (defaults->resolution != NULL && column_of(columns, "resolution") < 0)
-        case_doc_fields_set(&fields, "resolution", defaults->resolution);
-    if (defaults->model != NULL && column_of(columns, "model") < 0)
-        case_doc_fields_set(&fields, "model", defaults->model);
     case_doc_fields_end(&fields);
-    *ret = request.values;
 }
 
-enum ischia_code cohort_row_read(const struct cohort_columns *columns,
-                                 const struct cohort_defaults *defaults, const struct csv_row *row,
-                                 char **ret_echo, struct ischia_case *ret,
-                                 struct doc_faults *faults, struct ischia_error *err)
+enum ischia_code
+cohort_row_read(const struct cohort_columns *columns, const struct case_doc_defaults *defaults,
+                const struct csv_row *row, char **ret_echo, struct ischia_request *ret,
+                struct doc_faults *faults, struct ischia_error *err)
 {
     struct text_out out;
     text_out_init(&out);
