@@ -48,14 +48,15 @@ static int column_of(const struct cohort_columns *columns, const char *key)
 
 static void take_column(struct cohort_columns *columns, const char *name, struct doc_faults *faults)
 {
-    char buffer[64];
+    char buffer[64], pointer[DOC_POINTER_BYTES];
     const char *plain = trimmed(name, buffer);
     const char *key = meaning_of(plain);
+    (void)doc_pointer(pointer, sizeof pointer, "", plain);
     if (is_result_column(plain))
-        doc_faults_add(faults, plain, "not_allowed",
+        doc_faults_add(faults, pointer, "not_allowed",
                        "column %s is the name of a result column; rename or remove it", plain);
     if (key != NULL && column_of(columns, key) >= 0)
-        doc_faults_add(faults, plain, "duplicate", "column %s: %s is there more than once", plain,
+        doc_faults_add(faults, pointer, "duplicate", "column %s: %s is there more than once", plain,
                        key);
     columns->key[columns->count++] = key;
 }
@@ -63,10 +64,12 @@ static void take_column(struct cohort_columns *columns, const char *name, struct
 static void find_missing(const struct cohort_columns *columns, const struct csv_row *row,
                          struct doc_faults *faults)
 {
+    char pointer[DOC_POINTER_BYTES];
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
         const struct ischia_param_info *p = &ischia_params[i];
+        (void)doc_pointer(pointer, sizeof pointer, "", p->key);
         if (column_of(columns, p->key) < 0)
-            doc_faults_add(faults, p->key, "missing", "column %s is missing (or %s_%s)", p->key,
+            doc_faults_add(faults, pointer, "missing", "column %s is missing (or %s_%s)", p->key,
                            p->key, p->unit);
     }
     if (row->count == 1 && strpbrk(row->field[0], ";\t") != NULL)

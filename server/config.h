@@ -55,7 +55,7 @@ struct config {
     int workers;
     int worker_memory_mib;
     int worker_time_s;
-    int queue_limit;
+    int queue_limit, study_limit;
     int retention_days;
     int retention_count;
     int idempotency_hours;

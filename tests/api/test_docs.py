@@ -4,11 +4,12 @@
 the sample configuration are those of the program."""
 import os
 import re
+import shutil
 import subprocess
 import tempfile
 import unittest
 
-from service import HERE, PATIENCE_S, PROGRAM, Service
+from service import HERE, PATIENCE_S, PROGRAM, Service, side
 
 ROOT = os.path.join(HERE, '../..')
 
@@ -25,10 +26,10 @@ def curl_lines():
 
 def route_of(line):
     path = re.search(r'"\$ISCHIA(/[^"?]*)', line).group(1)
-    path = re.sub(r'\$(ID|RUNNING)', '{id}', path)
+    path = re.sub(r'\$(ID|RUNNING|STUDY)', '{id}', path)
     if '-X' in line:
         return re.search(r'-X (\w+)', line).group(1), path
-    return ('POST' if ' -d ' in line else 'GET'), path
+    return ('POST' if ' -d ' in line or ' --data-binary ' in line else 'GET'), path
 
 
 class Docs(unittest.TestCase):
@@ -43,6 +44,15 @@ class Docs(unittest.TestCase):
         }
         self.assertEqual(routes, {route_of(line) for line in curl_lines()})
 
+    def study(self, service):
+        design = {
+            'name': 'docs',
+            'design': {'kind': 'full'},
+            'factors': [{'key': 'F', 'levels': [599, 599.5]}],
+            'case': side(F=None),
+        }
+        return service.ask('POST', '/v1/studies', design).json()['id']
+
     def test_every_curl_line_works(self):
         with Service() as service, tempfile.TemporaryDirectory() as folder:
             service.until_ready()
@@ -51,8 +61,11 @@ class Docs(unittest.TestCase):
                 'ISCHIA': 'http://' + service.address,
                 'ID': service.submit(F=250.5, subject='P-017', side='left')['id'],
                 'RUNNING': service.submit(wait=0, F=599)['id'],
+                'STUDY': self.study(service),
             }
-            lines = sorted(curl_lines(), key=lambda line: '/cancel' not in line)
+            shutil.copy(os.path.join(ROOT, 'examples/table2.csv'), folder)
+            shutil.copy(os.path.join(ROOT, 'examples/design_table1_composite.json'), folder)
+            lines = sorted(curl_lines(), key=lambda line: ('/cancel' not in line, 'DELETE' in line))
             for line in lines:
                 done = subprocess.run(
                     ['bash', '-c', line],
