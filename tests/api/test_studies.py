@@ -1,20 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Studies over HTTP: what is asked for and answered, that no assessment waits for one, limits and
-access. $ISCHIA_POLYNOMIAL is `ischia` on a solver whose eps_max is a known polynomial
-(tests/double)."""
+access. What the results are is the matter of tests/study/service_test.py."""
 import csv
 import io
-import json
-import os
-import subprocess
 import tempfile
 import unittest
 
-from service import HERE, JSON, SIDE, Service, admin, eventually, side
+from service import JSON, SIDE, Service, admin, eventually, side
 
-ROOT = os.path.join(HERE, '../..')
-POLYNOMIAL = os.environ.get('ISCHIA_POLYNOMIAL')
 CSV = {'Content-Type': 'text/csv'}
 HANGS = 599
 
@@ -30,18 +24,12 @@ def design(points=None, **case):
     }
 
 
-def read(name):
-    with open(os.path.join(ROOT, 'examples', name), 'rb') as file:
-        return file.read()
-
-
 class Case(unittest.TestCase):
     options = ('--workers', '1')
-    worker = {}
 
     @classmethod
     def setUpClass(cls):
-        cls.service = Service(*cls.options, **cls.worker)
+        cls.service = Service(*cls.options)
         cls.service.until_ready()
 
     @classmethod
@@ -70,86 +58,13 @@ class Case(unittest.TestCase):
     def finish(self, study):
         eventually(lambda: self.service.get(study).json()['status'] == 'finished', study)
 
-    def table(self, study):
-        return self.service.get(study + '/results', Accept='text/csv').body.decode()
-
     def rows(self, study):
-        return list(csv.DictReader(io.StringIO(self.table(study))))
+        table = self.service.get(study + '/results', Accept='text/csv').body.decode()
+        return list(csv.DictReader(io.StringIO(table)))
 
     def metric(self, name):
         lines = self.service.get('/metrics').body.decode().splitlines()
         return float(next(line.split()[1] for line in lines if line.startswith(name + ' ')))
-
-
-class Results(Case):
-    worker = {'worker': POLYNOMIAL}
-
-    def command_line(self, *words, text):
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, 'in')
-            with open(path, 'wb') as file:
-                file.write(text)
-            out = os.path.join(folder, 'out.csv')
-            words = [path if word == '{}' else word for word in words]
-            subprocess.run([POLYNOMIAL, *words, '-o', out], capture_output=True, check=False)
-            with open(out, encoding='utf-8', newline='') as file:
-                return file.read()
-
-    def test_a_design_gives_what_the_command_line_gives(self):
-        text = json.loads(read('design_table1_composite.json'))
-        text['factors'][0] = {'key': 'R1', 'levels': [5, 7, 16]}  # 16 mm is refused
-        text = json.dumps(text).encode()
-        study = self.submit(json.loads(text)).headers['Location']
-        self.finish(study)
-        ours = self.table(study).splitlines()
-        theirs = self.command_line('study', 'factorial', '{}', '-q', text=text).splitlines()
-        self.assertEqual(len(ours), 80)
-        statuses = [line.split(',')[8] for line in ours[1:]]
-        self.assertEqual({'succeeded', 'failed', 'refused'}, set(statuses))
-        for mine, other, status in zip(ours, theirs, ['header', *statuses]):
-            if status == 'failed':  # the same row and reason, in the words of a problem document
-                self.assertEqual(mine.split(',')[:9], other.split(',')[:9])
-                self.assertIn('diverged_step: ', mine)
-            else:
-                self.assertEqual(mine, other)
-        failed = next(row for row in self.rows(study) if row['status'] == 'failed')
-        self.assertEqual((failed['last_converged_F_N'], failed['eps_max']), ('300', ''))
-
-    def test_a_cohort_gives_what_the_command_line_gives(self):
-        text = read('table2.csv') + b'P,right,7,22,31,10,8,5\nQ,left,7,22,31,10,80,5,300\n"x\n'
-        study = self.start(text, '?name=table2')
-        self.finish(study)
-        theirs = list(csv.reader(io.StringIO(self.command_line('cohort', '{}', text=text))))
-        ours = list(csv.reader(io.StringIO(self.table(study))))
-        self.assertEqual(len(ours), 1 + 26 + 3)
-        self.assertEqual([row[:-1] for row in ours], [row[:-1] for row in theirs])  # not wall_s
-
-    def test_json_says_the_same(self):
-        study = self.start(read('table2.csv') + b'P,right,7,6,31,10,8,5,200\n', '?model=as-published')
-        self.finish(study)
-        document = self.service.get(study + '/results').json()
-        self.assertEqual(document['columns'], read('table2.csv').decode().split()[0].split(','))
-        self.assertEqual([item['row'] for item in document['items']], list(range(1, 28)))
-        for item, row in zip(document['items'], self.rows(study)):
-            self.assertEqual(item['cells'], [row[c] for c in document['columns']])
-            self.assertEqual(item['status'], row['status'])
-            if item['results'] is None:
-                continue
-            self.assertEqual(item['results']['eps_max'], float(row['eps_max']))
-            self.assertEqual(item['model']['name'], 'as-published')
-            self.assertEqual(item['model']['bulk_ratio'], 30)
-        refused = document['items'][26]
-        self.assertEqual((refused['status'], refused['parameters']), ('refused', None))
-        self.assertIn('R2', refused['problem']['detail'])
-
-    def test_what_is_known_is_not_solved_again(self):
-        body = design(20, F=201)
-        self.finish(self.start(body))
-        workers = self.metric('ischia_study_points_total')
-        again = self.start(body)
-        self.finish(again)
-        self.assertEqual(self.metric('ischia_study_points_total'), workers)
-        self.assertEqual(self.points(again)['succeeded'], 20)
 
 
 class BehindAStudy(Case):
