@@ -56,6 +56,7 @@ struct config {
     int worker_memory_mib;
     int worker_time_s;
     int queue_limit, study_limit;
+    char emulator[CONFIG_TEXT_BYTES];
     int retention_days;
     int retention_count;
     int idempotency_hours;

@@ -244,6 +244,8 @@ static enum ischia_code create_parts(struct daemon *d, struct ischia_error *err)
     TRY(auth_create(&s->auth, s->store, err));
     TRY(audit_create(&s->audit, s->store, err));
     TRY(rate_create(&s->rate, err));
+    if (s->config.emulator[0] != '\0')
+        TRY(estimator_create(&s->estimator, s->config.emulator, err));
     if (s->config.cds_issuers[0] != '\0') TRY(trust_create(&s->trust, s->config.cds_issuers, err));
     return documents_create(&s->documents, err);
 }
@@ -572,6 +574,7 @@ static void finish(struct daemon *d)
     events_destroy(s->events);
     documents_destroy(s->documents);
     trust_destroy(s->trust);
+    estimator_destroy(s->estimator);
     rate_destroy(s->rate);
     audit_destroy(s->audit);
     auth_destroy(s->auth);

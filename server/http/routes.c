@@ -80,6 +80,8 @@ const struct route routes[] = {
      AUTH_READ, 0, NULL, TYPES("image/svg+xml"), NULL, "assessment.read", false},
     {HTTP_GET, ASSESSMENT "/report", "GET " ASSESSMENT "/report", handle_report, AUTH_READ, 0, NULL,
      TYPES("text/html"), TYPES("wait"), "assessment.read", false},
+    {HTTP_POST, "/v1/estimates", "POST /v1/estimates", handle_estimate, AUTH_ASSESS, CASE_BYTES_MAX,
+     TYPES(JSON), TYPES(JSON), NULL, NULL, false},
     {HTTP_POST, "/v1/studies", "POST /v1/studies", handle_study_submit, AUTH_ASSESS,
      STUDY_BYTES_MAX, TYPES(JSON, CSV), TYPES(JSON), TYPES("name", "model", "resolution"),
      "study.create", false},

@@ -11,6 +11,7 @@ import tempfile
 import unittest
 import urllib.parse
 
+from emulator_file import write_emulator
 from service import HERE, JSON, PATIENCE_S, PROGRAM, SIDE, Service, eventually, side
 
 METHODS = ('get', 'post', 'put', 'patch', 'delete')
@@ -37,13 +38,17 @@ class Contract(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         install_validators()
-        cls.service = Service()
+        cls.folder = tempfile.TemporaryDirectory()
+        emulator = os.path.join(cls.folder.name, 'emulator.txt')
+        write_emulator(emulator)
+        cls.service = Service('--emulator', emulator)
         cls.service.until_ready()
         cls.contract = cls.service.get('/openapi.json').json()
 
     @classmethod
     def tearDownClass(cls):
         cls.service.stop()
+        cls.folder.cleanup()
 
     def operations(self):
         for path, item in self.contract['paths'].items():
@@ -187,7 +192,17 @@ class Contract(unittest.TestCase):
             ask('GET', path, path, headers={'Accept': 'image/png'})
         ask('GET', '/v1/changes?since=x', '/v1/changes')
         self.tour_of_studies(ask)
+        self.tour_of_estimates(ask)
         return asked
+
+    def tour_of_estimates(self, ask):
+        one, inside = '/v1/estimates', side(R2=40)
+        for body in (inside, side(R1=4), side(model='as-published'), side(muM=99)):
+            ask('POST', one, one, body)
+        for body, headers in ((b'{', JSON), (b'x', {'Content-Type': 'text/plain'})):
+            ask('POST', one, one, body, headers)
+        ask('GET', one, one)
+        ask('POST', one, one, json.dumps(inside).encode(), {**JSON, 'Accept': 'image/png'})
 
     def tour_of_studies(self, ask):
         many, csv_type = '/v1/studies', {'Content-Type': 'text/csv'}

@@ -10,7 +10,7 @@ ROOMS = (
     ("solver/error.", PLAIN),
     ("solver/result.", PLAIN),
     ("solver/", ("solver/!study/",)),
-    ("api/", ("api/", "solver/study/design.h", *PLAIN)),
+    ("api/", ("api/", "solver/study/design.h", "solver/study/predictor.h", *PLAIN)),
     ("server/cli/", ("server/!http/!store/", "api/", "solver/solver.h", "solver/study/", *PLAIN)),
     ("server/store/", ("server/!http/!cli/", "api/", *PLAIN)),
     ("server/", ("server/!cli/", "api/", *PLAIN)),
