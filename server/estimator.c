@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "api/predictor_doc.h"
 #include "server/textfile.h"
 
 static enum ischia_code read_text(struct estimator *estimator, const char *text,

@@ -2,9 +2,9 @@
 #ifndef ISCHIA_SERVER_ESTIMATOR_H
 #define ISCHIA_SERVER_ESTIMATOR_H
 
+#include "api/predictor_doc.h"
 #include "server/digest.h"
 #include "solver/error.h"
-#include "solver/study/predictor.h"
 
 /* The trained emulator that estimates are made with. Constant once it is there: any thread. */
 struct estimator {

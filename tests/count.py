@@ -15,6 +15,7 @@ from collections import namedtuple
 
 Count = namedtuple("Count", "passed failed skipped")
 GOOD = {"OK", "EXPECTEDFAIL"}
+LAST_LINES = 25  # of what a failed test said, repeated at the end
 
 
 def add(a, b):
@@ -72,6 +73,12 @@ def count(test):
     return found._replace(failed=max(found.failed, whole.failed))
 
 
+def failure(test):
+    """Lines for people: a failed test and the last it said, so that the end of a log tells why."""
+    text = "\n".join(filter(None, (test.get("stdout"), test.get("stderr"))))
+    return [f"failed: {test['name']}", *("    " + line for line in text.splitlines()[-LAST_LINES:])]
+
+
 def skip_reasons(test):
     """Lines for people: which test was skipped, and its own words for why."""
     text = (test.get("stdout") or "") + "\n" + (test.get("stderr") or "")
@@ -94,7 +101,7 @@ def main(paths):
         for test in tests:
             total = add(total, count(test))
             if test["result"] not in GOOD | {"SKIP"}:
-                print(f"failed: {test['name']}")
+                print("\n".join(failure(test)))
             for reason in skip_reasons(test):
                 print(reason)
     print(f"{total.passed} passed, {total.failed} failed, {total.skipped} skipped")

@@ -84,7 +84,8 @@ static enum ischia_code prepare_location(struct store *store, enum store_mode mo
                                          struct ischia_error *err)
 {
     TRY(sqlite_make_directory(&store->paths, err));
-    enum ischia_code code = sqlite_lock(&store->paths, &store->lock_fd, err);
+    const int patience_ms = mode == STORE_SERVE ? SQLITE_LOCK_PATIENCE_MS : 0;
+    enum ischia_code code = sqlite_lock(&store->paths, patience_ms, &store->lock_fd, err);
     /* A daemon that serves the store has migrated it; a command beside it only joins in. */
     if (code == ISCHIA_E_STATE && mode == STORE_ADMIN) return ISCHIA_OK;
     return code;

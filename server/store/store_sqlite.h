@@ -197,9 +197,12 @@ ISCHIA_MUST_CHECK enum ischia_code sqlite_paths_of(const char *location, struct 
 /* Makes the directory when it is missing. */
 ISCHIA_MUST_CHECK enum ischia_code sqlite_make_directory(const struct sqlite_paths *paths,
                                                          struct ischia_error *err);
-/* Takes the daemon's lock. *ret_fd is closed to give it back. ISCHIA_E_STATE: someone has it. */
-ISCHIA_MUST_CHECK enum ischia_code sqlite_lock(const struct sqlite_paths *paths, int *ret_fd,
-                                               struct ischia_error *err);
+/* How long a daemon waits for the lock of the one before. */
+enum { SQLITE_LOCK_PATIENCE_MS = 5000 };
+/* Takes the daemon's lock, waiting for at most patience_ms. *ret_fd is closed to give it back.
+ * ISCHIA_E_STATE: someone has it. */
+ISCHIA_MUST_CHECK enum ischia_code sqlite_lock(const struct sqlite_paths *paths, int patience_ms,
+                                               int *ret_fd, struct ischia_error *err);
 /* Makes an empty file of mode 0600 unless there is one. */
 ISCHIA_MUST_CHECK enum ischia_code sqlite_make_file(const char *path, struct ischia_error *err);
 /* Judges a database file without changing it; *ret_version is 0 for an empty one. whole: also walk

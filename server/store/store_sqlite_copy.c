@@ -148,7 +148,7 @@ static enum ischia_code replace(const struct sqlite_paths *paths, const char *te
     enum ischia_code code = sqlite_look(paths->database, true, &version, err);
     if (code == ISCHIA_E_INPUT || code == ISCHIA_E_STATE) {
         /* nobody can be serving it, and the lock makes sure of that */
-        TRY(sqlite_lock(paths, &lock_fd, err));
+        TRY(sqlite_lock(paths, SQLITE_LOCK_PATIENCE_MS, &lock_fd, err));
         code = put_aside(paths->database, err);
         if (code == ISCHIA_OK) code = sqlite_make_file(paths->database, err);
     }

@@ -5,9 +5,12 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "server/store/store_sqlite.h"
+
+enum { LOCK_PAUSE_MS = 20 };
 
 enum ischia_code sqlite_paths_of(const char *location, struct sqlite_paths *ret,
                                  struct ischia_error *err)
@@ -49,12 +52,26 @@ enum ischia_code sqlite_sync_directory(const char *file_path, struct ischia_erro
     return ISCHIA_OK;
 }
 
-enum ischia_code sqlite_lock(const struct sqlite_paths *paths, int *ret_fd,
+/*
+ * Waits a little for a lock that somebody has: a worker that was forked in the moment in which the
+ * daemon before was killed has the lock as well, until it first runs and sees that it is alone.
+ */
+static bool lock_patiently(int fd, int patience_ms)
+{
+    const struct timespec pause = {.tv_nsec = LOCK_PAUSE_MS * 1000000};
+    for (int waited_ms = 0; flock(fd, LOCK_EX | LOCK_NB) != 0; waited_ms += LOCK_PAUSE_MS) {
+        if (errno != EWOULDBLOCK || waited_ms >= patience_ms) return false;
+        (void)nanosleep(&pause, NULL);
+    }
+    return true;
+}
+
+enum ischia_code sqlite_lock(const struct sqlite_paths *paths, int patience_ms, int *ret_fd,
                              struct ischia_error *err)
 {
     const int fd = open(paths->lock, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     CHECK(fd >= 0, err, ISCHIA_E_IO, "%s cannot be opened: %s", paths->lock, strerror(errno));
-    if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    if (!lock_patiently(fd, patience_ms)) {
         const int saved = errno;
         (void)close(fd);
         CHECK(saved != EWOULDBLOCK, err, ISCHIA_E_STATE,

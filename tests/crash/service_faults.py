@@ -6,6 +6,7 @@ $ISCHIAD; full and read-only disks need root (tmpfs).
 
 Defends invariants I3 and I6 to I9 of docs/INVARIANTS.md from where a client stands.
 """
+import fcntl
 import hashlib
 import os
 import re
@@ -14,6 +15,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -230,6 +232,19 @@ class DamagedDatabase(unittest.TestCase):
             file.truncate(0)
             file.write(b"subject,side\nP-1,left\n" * 1000)
         self.expect_refusal(damage, "not a database", "left as it is")
+
+
+class Restart(unittest.TestCase):
+    def test_lock_that_a_killed_daemon_left_to_a_child(self):
+        """A process forked at the last moment has the lock too, until it runs and sees."""
+        with tempfile.TemporaryDirectory(prefix="ischia-crash-") as state:
+            with open(state + "/ischia.lock", "w", encoding="ascii") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)
+                release = threading.Timer(1, fcntl.flock, (lock, fcntl.LOCK_UN))
+                release.start()
+                with Service(state=state) as service:
+                    self.assertFalse(release.is_alive(), "it did not wait for the lock")
+                    service.until_ready()
 
 
 if __name__ == "__main__":

@@ -74,6 +74,13 @@ class Count(unittest.TestCase):
         lines, _ = self.closing(test(), test("SKIP", "needs a network namespace\n", name="net"))
         self.assertIn("skipped: net: needs a network namespace", lines)
 
+    def test_a_failure_repeats_the_last_it_said(self):
+        said = "".join(f"line {i}\n" for i in range(100))
+        lines, _ = self.closing(test(), test("FAIL", said, name="kill"))
+        self.assertEqual(lines[0], "failed: kill")
+        self.assertIn("    line 99", lines)
+        self.assertNotIn("    line 50", lines)
+
     def test_nothing_ran_is_a_failure(self):
         self.check([], "0 passed, 0 failed, 0 skipped", 1)
 
