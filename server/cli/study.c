@@ -71,10 +71,19 @@ enum ischia_code study_load_plan(struct study_plan *ret, const char *path,
     return ISCHIA_OK;
 }
 
-int study_usage(const char *what, const char *usage)
+enum cli_parse study_lacks(const struct cli_usage *usage, const char *what)
 {
-    (void)fprintf(stderr, "%s`ischia study %s --help` says more.\n", usage, what);
-    return EXIT_BAD_INPUT;
+    (void)fprintf(stderr, "ischia %s: it needs %s; see ischia %s --help\n", usage->command, what,
+                  usage->command);
+    return CLI_BAD_USAGE;
+}
+
+enum cli_parse study_parse(const struct cli_usage *usage, int operands_min, int argc, char **argv,
+                           const char **ret_operands)
+{
+    const enum cli_parse parsed = cli_parse_options(usage, argc, argv, ret_operands);
+    if (parsed != CLI_RUN || ret_operands[operands_min - 1] != NULL) return parsed;
+    return study_lacks(usage, usage->synopsis);
 }
 
 enum ischia_code study_write(struct text_out *text, const char *path, struct ischia_error *err)

@@ -66,6 +66,7 @@ struct predictor_point predictor_point_of(const struct predictor *p, const struc
 struct predictor_estimate {
     double value, low, high; /* low ... high: 95 % band */
 };
+
 /* In the unit of the response that the output is named after. */
 struct predictor_estimate predictor_estimate_of(const struct predictor_output *output,
                                                 const struct predictor_point *point);

@@ -540,7 +540,7 @@ class Help(unittest.TestCase):
         listed = run("--help").stdout
         for command in ("factorial", "merge", "emulate", "compare"):
             self.assertIn(command, listed)
-            self.assertIn("usage: ischia study " + command, run(command, "--help").stdout)
+            self.assertIn("Usage: ischia study " + command, run(command, "--help").stdout)
         run(status=2)
         self.assertIn('no command "fit"', run("fit", status=2).stderr)
 
