@@ -105,8 +105,7 @@ static enum ischia_code insert_study(struct store *store, struct db *db,
     query_put_text(&query, what->idempotency_key);
     query_put_blob(&query, what->body_digest, STORE_DIGEST_BYTES);
     TRY(query_run(&query, err));
-    *ret_seq = sqlite3_last_insert_rowid(db->handle);
-    return ISCHIA_OK;
+    return number_by(db, SQL_STUDY_SEQ, &accept->id, 0, ret_seq, err);
 }
 
 static enum ischia_code insert_point(struct db *db, int64_t seq, int64_t line,
