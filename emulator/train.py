@@ -4,7 +4,7 @@
 factorial`. docs/EMULATOR.md says what it computes. Needs NumPy (Debian: python3-numpy).
 
   train.py ROWS.csv... -o emulator.txt --program build/release/server/cli/ischia
-           [--degree 4] [--resolution standard] [--model default] [--trial] [--seed 1]
+           [--degree 5] [--resolution standard] [--model default] [--trial] [--seed 1]
 
 The same files and options give the same bytes on one machine.
 """
@@ -38,6 +38,7 @@ OUTPUTS = (
 ROWS_MIN = 40  # fewer say nothing about an output
 COVERAGE = 0.95
 FOLDS = 10
+CANDIDATES = ((2, 2), (3, 2), (3, 3), (4, 2), (4, 3), (5, 2))  # total degree, inputs in a product
 
 
 def read_rows(paths):
@@ -65,7 +66,7 @@ def scaled(rows, box):
     return np.column_stack(columns)
 
 
-def degrees_up_to(total, together=3):
+def degrees_up_to(total, together=2):
     """All products of Legendre polynomials of at most that total degree, in at most so many inputs."""
     every = itertools.product(range(total + 1), repeat=len(INPUTS))
     kept = [d for d in every if sum(d) <= total and sum(1 for i in d if i) <= together]
@@ -125,13 +126,15 @@ def fit(A, y):
     return theta
 
 
-def left_out(A, y, chosen, seed):
-    """Errors of predictions of rows that had no part in their fit: the columns stay as chosen."""
+def left_out(A, y, seed):
+    """Errors of predictions of rows that had no part in them: neither in the fit nor in the choice
+    of its columns."""
     order = np.random.default_rng(seed).permutation(len(y))
     errors = np.empty(len(y))
     for fold in range(FOLDS):
         out = order[fold::FOLDS]
         rest = np.setdiff1d(order, out)
+        chosen = choose(A[rest], y[rest], most=A.shape[1])
         errors[out] = y[out] - A[np.ix_(out, chosen)] @ fit(A[np.ix_(rest, chosen)], y[rest])
     return errors
 
@@ -151,6 +154,20 @@ def terms(degrees, theta):
     return [[*map(int, d), float(f"{t:.10g}")] for d, t in zip(degrees, theta)]
 
 
+def least_error(z, y, degree, seed):
+    """Of the bases up to that degree the one whose predictions of left-out rows are best."""
+    best = None
+    for total, together in CANDIDATES:
+        if total > degree:
+            continue
+        degrees = degrees_up_to(total, together)
+        A = basis(z, degrees)
+        errors = left_out(A, y, seed)
+        if best is None or np.mean(errors**2) < np.mean(best[0] ** 2):
+            best = errors, degrees, A
+    return best
+
+
 def train_output(name, power, rows, box, degree, seed):
     rows = [r for r in rows if r.get(name)]
     if len(rows) < ROWS_MIN:
@@ -158,11 +175,9 @@ def train_output(name, power, rows, box, degree, seed):
     z = scaled(rows, box)
     values = np.array([float(r[name]) for r in rows])
     y = np.sqrt(np.maximum(values, 0)) if power == 2 else values
-    degrees = degrees_up_to(degree)
-    A = basis(z, degrees)
+    errors, degrees, A = least_error(z, y, degree, seed)
     chosen = choose(A, y, most=len(degrees))
     theta = fit(A[:, chosen], y)
-    errors = left_out(A, y, chosen, seed)
     guess = y - errors
     held_out = (np.maximum(guess, 0) ** 2 if power == 2 else guess) - values
     spread_degrees, spread_theta, reach = spread_of(z, errors)
@@ -192,7 +207,7 @@ def main():
     parse.add_argument("rows", nargs="+", type=pathlib.Path)
     parse.add_argument("-o", "--output", required=True, type=pathlib.Path)
     parse.add_argument("--program", required=True)
-    parse.add_argument("--degree", type=int, default=4)
+    parse.add_argument("--degree", type=int, default=5, help="the highest to try, 2 to 5")
     parse.add_argument("--resolution", default="standard", help="of the solves")
     parse.add_argument("--model", default="default", help="of the solves")
     parse.add_argument("--seed", type=int, default=1)
