@@ -4,8 +4,9 @@
 
   run.py --program build/release/server/cli/ischia --work DIR [-j N] [--only NAME,...] [--list]
 
-Resumable: run it again after a stop, and it goes on where it was. A file that is kept already and was
-made by this version of the program is not made again. Python's standard library only.
+Resumable: run it again after a stop, and it goes on where it was (the 26 solves of a cohort start
+anew). A file that is kept already and was made by this version of the program is not made again.
+Python's standard library only.
 """
 
 import argparse
