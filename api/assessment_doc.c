@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
+#include "api/case_words.h"
 #include "api/fields.h"
 
 const char *const assessment_status_names[ASSESSMENT_STATUS_COUNT] = {
@@ -49,7 +50,7 @@ static void write_warnings(struct json_out *out, const char *key, const void *ba
 {
     const struct ischia_case *c = &((const struct assessment *)base)->request.values;
     struct ischia_fault warnings[ISCHIA_PARAM_COUNT];
-    const size_t count = ischia_case_warnings(c, warnings);
+    const size_t count = case_warnings(c, LANGUAGE_EN, warnings);
     json_open_array(out, key);
     for (size_t i = 0; i < count; i++) {
         json_open_object(out, NULL);

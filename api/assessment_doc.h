@@ -8,8 +8,8 @@
 /*
  * The assessment document of docs/API.md: one side, from queued to its end. The request's options
  * stand beside "parameters" under the names a request uses: skin, resolution, model. "warnings" are
- * those of the case (ischia_case_warnings); links other than self are null until there is something
- * behind them (field, section and report once succeeded).
+ * those of the case (case_warnings), in English, as all words of what is kept; links other than
+ * self are null until there is something behind them (field, section and report once succeeded).
  */
 enum assessment_status {
     ASSESSMENT_QUEUED,

@@ -9,12 +9,19 @@
 
 /* ---- JSON ---- */
 
+static const enum word type_words[JSON_TYPE_COUNT] = {
+    [JSON_NULL] = WORD_DAEMON_JSON_NULL,     [JSON_BOOL] = WORD_DAEMON_JSON_BOOL,
+    [JSON_NUMBER] = WORD_DAEMON_JSON_NUMBER, [JSON_STRING] = WORD_DAEMON_JSON_STRING,
+    [JSON_ARRAY] = WORD_DAEMON_JSON_ARRAY,   [JSON_OBJECT] = WORD_DAEMON_JSON_OBJECT,
+};
+
 /* How a value of the wrong kind is named in a fault: "\"8.0\"", "an array", ... */
-static const char *describe(const struct json *value, char *buffer, size_t size)
+static const char *describe(enum language language, const struct json *value, char *buffer,
+                            size_t size)
 {
     char shown[28];
     const enum json_type type = json_type_of(value);
-    if (type != JSON_STRING && type != JSON_NUMBER) return json_type_names[type];
+    if (type != JSON_STRING && type != JSON_NUMBER) return words_get(language, type_words[type]);
     if (type == JSON_NUMBER)
         (void)snprintf(buffer, size, "%g", json_number(value));
     else
@@ -26,7 +33,8 @@ static const char *describe(const struct json *value, char *buffer, size_t size)
 static void refuse_type(struct case_doc_fields *fields, int key, const struct json *value)
 {
     char given[TEXT_NUMBER_BYTES];
-    case_key_refuse(fields, key, "wrong_type", describe(value, given, sizeof given));
+    case_key_refuse(fields, key, "wrong_type",
+                    describe(fields->faults->language, value, given, sizeof given));
 }
 
 static void read_number(struct case_doc_fields *fields, int key, const struct json *value)
@@ -93,7 +101,8 @@ static void read_skin(struct case_doc_fields *fields, int key, const struct json
 static void refuse_sd(struct case_doc_fields *fields, int key, const struct json *value)
 {
     (void)value;
-    case_key_refuse(fields, key, "unsupported", "given");
+    case_key_refuse(fields, key, "unsupported",
+                    words_get(fields->faults->language, WORD_DAEMON_FAULT_GIVEN));
 }
 
 static void (*const readers[KEY_FIRST_OPTION])(struct case_doc_fields *, int,
@@ -125,8 +134,9 @@ void case_doc_read_value_over(struct ischia_request *ret, const struct case_doc_
     case_doc_fields_init(&fields, ret, faults);
     case_doc_fields_set_defaults(&fields, defaults);
     if (value != NULL && json_type_of(value) != JSON_OBJECT) {
-        doc_faults_add(faults, "", "wrong_type", "the document is %s; accepted an object",
-                       json_type_names[json_type_of(value)]);
+        doc_faults_say(faults, "", "wrong_type", WORD_DAEMON_FAULT_DOCUMENT,
+                       WORDS(word_text(
+                           "given", words_get(faults->language, type_words[json_type_of(value)]))));
         return;
     }
     for (const struct json *m = json_first(value); m != NULL; m = json_next(m))

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "api/case_keys.h"
+#include "api/case_words.h"
 
 _Static_assert(KEY_COUNT <= 32, "case_doc_fields.seen has one bit for each key");
 
@@ -141,9 +142,10 @@ bool case_key_first_time(struct case_doc_fields *fields, int key, const char *sp
     else
         (void)doc_pointer(pointer, sizeof pointer, "", spelling);
     if (!doc_faults_has(fields->faults, pointer))
-        doc_faults_add(fields->faults, pointer, "duplicate", "%s is given more than once%s%s",
-                       spelling, strcmp(spelling, case_key_name(key)) != 0 ? ", also as " : "",
-                       strcmp(spelling, case_key_name(key)) != 0 ? case_key_name(key) : "");
+        doc_faults_say(fields->faults, pointer, "duplicate",
+                       strcmp(spelling, case_key_name(key)) == 0 ? WORD_DAEMON_FAULT_DUPLICATE
+                                                                 : WORD_DAEMON_FAULT_DUPLICATE_AS,
+                       WORDS(word_text("key", spelling), word_text("name", case_key_name(key))));
     return false;
 }
 
@@ -153,50 +155,65 @@ static void append(char *text, size_t size, const char *word)
     (void)snprintf(text + used, size - used, "%s%s", used > 0 ? ", " : "", word);
 }
 
-static void accepted_range(char *text, size_t size, double min, double max, const char *unit)
+static void accepted_range(enum language language, char *text, size_t size, double min, double max,
+                           const char *unit)
 {
-    const bool plain = strcmp(unit, "1") == 0;
-    (void)snprintf(text, size, "a number from %g to %g%s%s", min, max, plain ? "" : " ",
-                   plain ? "" : unit);
+    char spaced[16];
+    (void)words_fill(text, size, language, WORD_DAEMON_FAULT_ACCEPTED_NUMBER,
+                     WORDS(word_number("min", min, 6), word_number("max", max, 6),
+                           word_text("unit", case_spaced_unit(unit, spaced))));
+}
+
+static void accepted_models(enum language language, char *text, size_t size)
+{
+    char names[64] = "";
+    for (size_t i = 0; i < ischia_preset_count; i++)
+        append(names, sizeof names, ischia_presets[i].name);
+    (void)words_fill(text, size, language, WORD_DAEMON_FAULT_ACCEPTED_MODEL,
+                     WORDS(word_text("names", names)));
 }
 
 /* What a key takes, in words. */
-static const char *accepted(int key, char *text, size_t size)
+static const char *accepted(enum language language, int key, char *text, size_t size)
 {
+    static const enum word words[KEY_COUNT] = {
+        [KEY_SUBJECT] = WORD_DAEMON_FAULT_ACCEPTED_SUBJECT,
+        [KEY_MEASURED_AT] = WORD_DAEMON_FAULT_ACCEPTED_MEASURED_AT,
+        [KEY_LABEL] = WORD_DAEMON_FAULT_ACCEPTED_LABEL,
+        [KEY_SKIN] = WORD_DAEMON_FAULT_ACCEPTED_SKIN,
+        [KEY_SD] = WORD_DAEMON_FAULT_ACCEPTED_SD,
+    };
     text[0] = '\0';
     if (key < ISCHIA_PARAM_COUNT) {
         const struct ischia_param_info *p = &ischia_params[key];
-        accepted_range(text, size, p->accepted_min, p->accepted_max, p->unit);
+        accepted_range(language, text, size, p->accepted_min, p->accepted_max, p->unit);
     } else if (key >= KEY_FIRST_OPTION) {
         const struct ischia_option_info *o = &ischia_options[key - KEY_FIRST_OPTION];
-        accepted_range(text, size, o->accepted_min, o->accepted_max, o->unit);
+        accepted_range(language, text, size, o->accepted_min, o->accepted_max, o->unit);
     } else if (key == KEY_RESOLUTION) {
         for (int i = 0; i < ISCHIA_RESOLUTION_COUNT; i++)
             append(text, size, ischia_resolution_names[i]);
+    } else if (key == KEY_SIDE) {
+        for (int i = ISCHIA_SIDE_LEFT; i < ISCHIA_SIDE_COUNT; i++)
+            append(text, size, ischia_side_names[i]);
     } else if (key == KEY_MODEL) {
-        for (size_t i = 0; i < ischia_preset_count; i++) append(text, size, ischia_presets[i].name);
-        append(text, size, "an object of options");
+        accepted_models(language, text, size);
     } else {
-        static const char *const words[KEY_COUNT] = {
-            [KEY_SUBJECT] = "a pseudonym of 1 to 64 characters from A-Z a-z 0-9 . _ -, no name",
-            [KEY_SIDE] = "left, right",
-            [KEY_MEASURED_AT] = "a date or time such as 2026-03-01 or 2026-03-01T09:30:00Z",
-            [KEY_LABEL] = "a text of at most 200 characters without control characters",
-            [KEY_SKIN] = "an object { \"mu\": kPa, \"thickness\": mm }",
-            [KEY_SD] = "nothing yet: this version does not compute with uncertain inputs",
-        };
-        (void)snprintf(text, size, "%s", words[key]);
+        (void)snprintf(text, size, "%s", words_get(language, words[key]));
     }
     return text;
 }
 
 void case_key_refuse(struct case_doc_fields *fields, int key, const char *code, const char *given)
 {
-    char pointer[DOC_POINTER_BYTES], text[128], shown[32];
+    const enum language language = fields->faults->language;
+    char pointer[DOC_POINTER_BYTES], text[128], shown[48];
     (void)key_pointer(key, pointer);
     if (doc_faults_has(fields->faults, pointer)) return; /* one fault a value is enough */
-    doc_faults_add(fields->faults, pointer, code, "%s is %s; accepted %s", case_key_name(key),
-                   text_printable(given, shown, sizeof shown), accepted(key, text, sizeof text));
+    doc_faults_say(fields->faults, pointer, code, WORD_DAEMON_FAULT_REFUSED,
+                   WORDS(word_text("key", case_key_name(key)),
+                         word_text("given", text_printable(given, shown, sizeof shown)),
+                         word_text("accepted", accepted(language, key, text, sizeof text))));
 }
 
 void case_key_unknown(struct case_doc_fields *fields, const char *pointer, const char *spelling)
@@ -205,13 +222,13 @@ void case_key_unknown(struct case_doc_fields *fields, const char *pointer, const
     const char *nearest = case_doc_nearest_key(spelling);
     (void)text_printable(spelling, shown, sizeof shown);
     if (nearest != NULL) {
-        doc_faults_add(fields->faults, pointer, "unknown",
-                       "%s is not a known key; did you mean %s?", shown, nearest);
+        doc_faults_say(fields->faults, pointer, "unknown", WORD_DAEMON_FAULT_NEAREST,
+                       WORDS(word_text("key", shown), word_text("nearest", nearest)));
         return;
     }
     for (int key = 0; key < KEY_SD; key++) append(known, sizeof known, case_key_name(key));
-    doc_faults_add(fields->faults, pointer, "unknown", "%s is not a known key; known: %s", shown,
-                   known);
+    doc_faults_say(fields->faults, pointer, "unknown", WORD_DAEMON_FAULT_UNKNOWN,
+                   WORDS(word_text("key", shown), word_text("known", known)));
 }
 
 /* ---- values ---- */
@@ -319,7 +336,9 @@ void case_key_set_text(struct case_doc_fields *fields, int key, const char *valu
     assert(setter->set != NULL);
     if (setter->set(fields->request, value)) return;
     case_key_refuse(fields, key, setter->code,
-                    setter->may_echo ? quoted(value, given, sizeof given) : "not as it should be");
+                    setter->may_echo
+                        ? quoted(value, given, sizeof given)
+                        : words_get(fields->faults->language, WORD_DAEMON_FAULT_WRONG));
 }
 
 /* ---- field by field ---- */
@@ -336,9 +355,10 @@ void case_doc_fields_init(struct case_doc_fields *ret, struct ischia_request *re
 static void refuse_ambiguous(struct case_doc_fields *fields, int key, const char *value)
 {
     char pointer[DOC_POINTER_BYTES], shown[28];
-    doc_faults_add(fields->faults, key_pointer(key, pointer), "ambiguous",
-                   "%s is \"%s\" with more than one decimal mark; write 1234.5 or 1234,5",
-                   case_key_name(key), text_printable(value, shown, sizeof shown));
+    doc_faults_say(fields->faults, key_pointer(key, pointer), "ambiguous",
+                   WORD_DAEMON_FAULT_AMBIGUOUS,
+                   WORDS(word_text("key", case_key_name(key)),
+                         word_text("value", text_printable(value, shown, sizeof shown))));
 }
 
 static enum text_typed read_number_text(const struct case_doc_fields *fields, const char *value,
@@ -368,7 +388,8 @@ static void set_trimmed(struct case_doc_fields *fields, int key, const char *val
     else if (text_setters[key].set != NULL)
         case_key_set_text(fields, key, value);
     else
-        case_key_refuse(fields, key, "unsupported", "given");
+        case_key_refuse(fields, key, "unsupported",
+                        words_get(fields->faults->language, WORD_DAEMON_FAULT_GIVEN));
 }
 
 void case_doc_fields_set(struct case_doc_fields *fields, const char *key, const char *value)

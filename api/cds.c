@@ -162,12 +162,12 @@ static void write_detail(char *text, size_t size, const struct record *last,
         record_digits(last, measure_find("eps_max_error"), digits[1]));
     if (other != NULL)
         add(text, size, "- %s side, last assessed %.10s: %s\n", side_words(other),
-            other->finished_at, risk_bands[other->risk.band].headline);
+            other->finished_at, risk_headline(other->risk.band));
     if (measured_at[0] != '\0' && fhir_date_span(measured_at, &measured, &until) &&
         fhir_date_span(last->created_at, &made, &until) && measured > made)
         add(text, size, "\n**The record has measurements of %.10s, newer than this assessment.**\n",
             measured_at);
-    for (int i = 0; i < RISK_CAVEAT_COUNT; i++) add(text, size, "\n*%s*", risk_caveats[i]);
+    for (size_t i = 0; i < RISK_CAVEAT_COUNT; i++) add(text, size, "\n*%s*", risk_caveat(i));
 }
 
 static void put_link(struct json_out *out, const char *label, const char *origin, const char *id)
@@ -188,7 +188,7 @@ void cds_put_card(struct json_out *out, const struct record *last, const struct 
     const bool worst_below =
         last->risk.band == RISK_BELOW && (other == NULL || other->risk.band == RISK_BELOW);
     (void)snprintf(summary, sizeof summary, "%s ischium, %.10s: %s", side_words(last),
-                   last->finished_at, risk_bands[last->risk.band].headline);
+                   last->finished_at, risk_headline(last->risk.band));
     write_detail(detail, sizeof detail, last, other, measured_at);
     json_open_object(out, NULL);
     json_put_string(out, "uuid", last->id);

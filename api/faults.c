@@ -5,12 +5,14 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/case_words.h"
 #include "api/text.h"
 
 void doc_faults_init(struct doc_faults *ret)
 {
     ret->count = 0;
     ret->dropped = 0;
+    ret->language = LANGUAGE_EN;
 }
 
 /* The next free item, NULL (and one more dropped) when there is none. */
@@ -38,6 +40,14 @@ void doc_faults_add(struct doc_faults *faults, const char *pointer, const char *
     (void)text_printable(detail, item->detail, sizeof item->detail);
 }
 
+void doc_faults_say(struct doc_faults *faults, const char *pointer, const char *code,
+                    enum word word, const struct word_value *values)
+{
+    char detail[512];
+    doc_faults_add(faults, pointer, code, "%s",
+                   words_fill(detail, sizeof detail, faults->language, word, values));
+}
+
 bool doc_faults_has(const struct doc_faults *faults, const char *pointer)
 {
     for (size_t i = 0; i < faults->count; i++)
@@ -47,12 +57,14 @@ bool doc_faults_has(const struct doc_faults *faults, const char *pointer)
 
 void doc_faults_add_case(struct doc_faults *faults, const struct ischia_case *c)
 {
-    struct ischia_fault found[ISCHIA_CASE_FAULTS_MAX];
+    struct ischia_case_fault found[ISCHIA_CASE_FAULTS_MAX];
     const size_t count = ischia_case_faults(c, found);
     for (size_t i = 0; i < count; i++) {
-        if (doc_faults_has(faults, found[i].pointer)) continue;
+        struct ischia_fault fault;
+        case_fault_words(&fault, faults->language, c, &found[i]);
+        if (doc_faults_has(faults, fault.pointer)) continue;
         struct ischia_fault *item = next_item(faults);
-        if (item != NULL) *item = found[i];
+        if (item != NULL) *item = fault;
     }
 }
 

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "api/words.h"
 #include "solver/case.h"
 
 /*
@@ -15,15 +16,22 @@
  * not_allowed (a word that is not one of those accepted), malformed (text of the wrong form),
  * unsupported.
  */
+struct ischia_fault {
+    char pointer[48]; /* RFC 6901: "/muM", "/skin/mu" */
+    char code[24];
+    char detail[160]; /* in words */
+};
+
 enum { DOC_FAULTS_MAX = 32, DOC_POINTER_BYTES = sizeof((struct ischia_fault *)0)->pointer };
 
 struct doc_faults {
     struct ischia_fault item[DOC_FAULTS_MAX];
-    size_t count;   /* of item                                          */
-    size_t dropped; /* how many more there were than item has room for  */
+    size_t count;           /* of item                                          */
+    size_t dropped;         /* how many more there were than item has room for  */
+    enum language language; /* of the details                                */
 };
 
-/* An empty list. */
+/* An empty list, in English. */
 void doc_faults_init(struct doc_faults *ret);
 
 /* Adds one fault. pointer is cut to its room between characters; the detail is printf-style and is
@@ -31,6 +39,10 @@ void doc_faults_init(struct doc_faults *ret);
 __attribute__((format(printf, 4, 5))) void doc_faults_add(struct doc_faults *faults,
                                                           const char *pointer, const char *code,
                                                           const char *format, ...);
+
+/* The same in the words of the list's language. */
+void doc_faults_say(struct doc_faults *faults, const char *pointer, const char *code,
+                    enum word word, const struct word_value *values);
 
 /* Adds faults that the solver's tables found (ischia_case_faults), except those whose pointer
  * already has one: a value that could not be read is not also missing. */

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/case_words.h"
 #include "api/fhir_write.h"
 #include "api/measure.h"
 
@@ -53,7 +54,8 @@ static void put_measures(struct json_out *out)
 static void put_bands(struct json_out *out)
 {
     for (int i = 0; i < RISK_BAND_COUNT; i++)
-        put_concept(out, risk_bands[i].name, risk_bands[i].headline, risk_bands[i].headline);
+        put_concept(out, risk_bands[i].name, risk_headline((enum risk_band)i),
+                    risk_headline((enum risk_band)i));
 }
 
 static void put_assessment_code(struct json_out *out)
@@ -115,7 +117,8 @@ static void put_input_parameters(struct json_out *out)
         const struct ischia_param_info *p = &ischia_params[i];
         (void)snprintf(documentation, sizeof documentation,
                        "%s Accepted: %g to %g %s, in UCUM units that can be converted.",
-                       p->description, p->accepted_min, p->accepted_max, p->unit);
+                       words_get(LANGUAGE_EN, param_words[i].help), p->accepted_min,
+                       p->accepted_max, p->unit);
         put_parameter(out, p->key, "in", 0, "Quantity", documentation);
     }
 }

@@ -72,10 +72,11 @@ void fhir_put_outcome(struct json_out *out, const struct problem *problem)
     json_put_string(out, "resourceType", "OperationOutcome");
     json_open_array(out, "issue");
     if (faults->count == 0)
-        put_issue(out, issue_of_kind[problem->kind], problem_kinds[problem->kind].title,
-                  problem->detail, "");
+        put_issue(out, issue_of_kind[problem->kind],
+                  words_get(LANGUAGE_EN, problem_kinds[problem->kind].title), problem->detail, "");
     for (size_t i = 0; i < faults->count; i++)
-        put_issue(out, issue_type(faults->item[i].code), problem_kinds[problem->kind].title,
+        put_issue(out, issue_type(faults->item[i].code),
+                  words_get(LANGUAGE_EN, problem_kinds[problem->kind].title),
                   faults->item[i].detail, faults->item[i].pointer);
     json_close_array(out);
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "api/base64.h"
+#include "api/case_words.h"
 #include "api/fhir_write.h"
 #include "api/measure.h"
 
@@ -252,8 +253,9 @@ static void put_prediction(struct json_out *out, const struct record *record)
     json_open_object(out, "outcome");
     json_put_string(out, "text", outcome);
     json_close_object(out);
-    fhir_put_concept(out, "qualitativeRisk", FHIR_BAND_SYSTEM, band->name, band->headline,
-                     band->headline);
+    fhir_put_concept(out, "qualitativeRisk", FHIR_BAND_SYSTEM, band->name,
+                     words_get(LANGUAGE_EN, band->headline),
+                     words_get(LANGUAGE_EN, band->headline));
     json_put_string(out, "rationale", reasons);
     json_close_object(out);
     json_close_array(out);
@@ -263,10 +265,10 @@ static void put_prediction(struct json_out *out, const struct record *record)
 static void put_notes(struct json_out *out, const struct record *record)
 {
     struct ischia_fault warnings[ISCHIA_PARAM_COUNT];
-    const size_t count = ischia_case_warnings(&record->request.values, warnings);
+    const size_t count = case_warnings(&record->request.values, LANGUAGE_EN, warnings);
     json_open_array(out, "note");
     if (record->problem[0] != '\0') put_note(out, record->problem);
-    for (int i = 0; i < RISK_CAVEAT_COUNT; i++) put_note(out, risk_caveats[i]);
+    for (size_t i = 0; i < RISK_CAVEAT_COUNT; i++) put_note(out, risk_caveat(i));
     for (size_t i = 0; i < count; i++) put_note(out, warnings[i].detail);
     json_close_array(out);
 }
@@ -367,7 +369,7 @@ void fhir_put_diagnostic_report(struct json_out *out, const char *key, const str
     if (record->finished_at[0] != '\0') json_put_string(out, "issued", record->finished_at);
     put_observation_references(out, "result", record, MEASURE_COUNT, contained);
     if (done)
-        json_put_string(out, "conclusion", risk_bands[record->risk.band].headline);
+        json_put_string(out, "conclusion", risk_headline(record->risk.band));
     else if (record->problem[0] != '\0')
         json_put_string(out, "conclusion", record->problem);
     if (html[0] != '\0') put_attachment(out, record, html);
@@ -441,7 +443,7 @@ void fhir_put_device(struct json_out *out, const char *key)
     put_version(out, "model " ISCHIA_MODEL_NAME, version);
     json_close_array(out);
     json_open_array(out, "note");
-    put_note(out, risk_caveats[RISK_CAVEAT_COUNT - 1]);
+    put_note(out, risk_caveat(RISK_CAVEAT_COUNT - 1));
     json_close_array(out);
     json_close_object(out);
 }

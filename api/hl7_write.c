@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/case_words.h"
 #include "api/hl7.h"
 #include "api/measure.h"
 
@@ -153,11 +154,11 @@ static void put_number(struct text_out *out, int *sequence, int measure, const c
 static void put_notes(struct text_out *out, const struct record *record)
 {
     struct ischia_fault warnings[ISCHIA_PARAM_COUNT];
-    const size_t count = ischia_case_warnings(&record->request.values, warnings);
+    const size_t count = case_warnings(&record->request.values, LANGUAGE_EN, warnings);
     int sequence = 0;
     for (size_t i = 0; i < RISK_CAVEAT_COUNT + count; i++) {
         put(out, "NTE|%d|L|", ++sequence);
-        hl7_put_text(out, i < RISK_CAVEAT_COUNT ? risk_caveats[i]
+        hl7_put_text(out, i < RISK_CAVEAT_COUNT ? risk_caveat(i)
                                                 : warnings[i - RISK_CAVEAT_COUNT].detail);
         text_put_string(out, "\r");
     }
@@ -168,7 +169,7 @@ static void put_result(struct text_out *out, const struct record *record, int *s
     const struct risk *risk = &record->risk;
     put_text_observation(out, sequence, "band", "Damage thresholds crossed",
                          risk_bands[risk->band].name);
-    put_text_observation(out, sequence, "headline", "In words", risk_bands[risk->band].headline);
+    put_text_observation(out, sequence, "headline", "In words", risk_headline(risk->band));
     for (int i = 0; i < risk->reason_count; i++)
         put_text_observation(out, sequence, "reason", "Why", risk->reason[i]);
 }

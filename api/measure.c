@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/case_words.h"
+
 /* Places in the assessment document, in the order of ischia_params. */
 static const char *const input_pointers[ISCHIA_PARAM_COUNT] = {
     "/parameters/R1",  "/parameters/R2",  "/parameters/eM", "/parameters/eF",
@@ -84,8 +86,8 @@ struct measure measure_at(int index)
     assert(index >= 0 && index < MEASURE_COUNT);
     if (!measure_is_input(index)) return results[index - ISCHIA_PARAM_COUNT].measure;
     const struct ischia_param_info *p = &ischia_params[index];
-    return (struct measure){p->key, input_displays[index], p->unit, p->description,
-                            input_pointers[index]};
+    return (struct measure){p->key, input_displays[index], p->unit,
+                            words_get(LANGUAGE_EN, param_words[index].help), input_pointers[index]};
 }
 
 int measure_find(const char *code)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "api/case_doc.h"
+#include "api/case_words.h"
 #include "api/json.h"
 #include "api/risk.h"
 
@@ -16,8 +17,9 @@ static void put_range(struct json_out *out, const char *key, double min, double 
     json_close_object(out);
 }
 
-static void write_model(struct json_out *out)
+static void write_model(struct json_out *out, enum language language)
 {
+    (void)language;
     json_open_object(out, "model");
     json_put_string(out, "name", ISCHIA_MODEL_NAME);
     json_put_integer(out, "version", ISCHIA_MODEL_VERSION);
@@ -37,17 +39,17 @@ static void write_aliases(struct json_out *out, const char *key)
     json_close_array(out);
 }
 
-static void write_parameters(struct json_out *out)
+static void write_parameters(struct json_out *out, enum language language)
 {
     json_open_array(out, "parameters");
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
         const struct ischia_param_info *p = &ischia_params[i];
         json_open_object(out, NULL);
         json_put_string(out, "key", p->key);
-        json_put_string(out, "name", p->name);
+        json_put_string(out, "name", words_get(language, param_words[i].name));
         write_aliases(out, p->key);
         json_put_string(out, "unit", p->unit);
-        json_put_string(out, "description", p->description);
+        json_put_string(out, "description", words_get(language, param_words[i].help));
         put_range(out, "accepted", p->accepted_min, p->accepted_max);
         put_range(out, "studied", p->studied_min, p->studied_max);
         json_close_object(out);
@@ -55,7 +57,7 @@ static void write_parameters(struct json_out *out)
     json_close_array(out);
 }
 
-static void write_options(struct json_out *out)
+static void write_options(struct json_out *out, enum language language)
 {
     char pointer[DOC_POINTER_BYTES];
     json_open_array(out, "options");
@@ -67,7 +69,7 @@ static void write_options(struct json_out *out)
         json_put_string(out, "key", o->key);
         json_put_string(out, "pointer", pointer);
         json_put_string(out, "unit", o->unit);
-        json_put_string(out, "description", o->description);
+        json_put_string(out, "description", words_get(language, option_words[i]));
         put_range(out, "accepted", o->accepted_min, o->accepted_max);
         json_put_number(out, "default", o->default_value);
         json_close_object(out);
@@ -85,13 +87,16 @@ static void write_preset_group(struct json_out *out, const char *group,
     json_close_object(out);
 }
 
-static void write_presets(struct json_out *out)
+static const enum word preset_words[] = {WORD_DAEMON_PRESET_DEFAULT,
+                                         WORD_DAEMON_PRESET_PUBLISHED}; /* of ischia_presets */
+
+static void write_presets(struct json_out *out, enum language language)
 {
     json_open_array(out, "presets");
     for (size_t i = 0; i < ischia_preset_count; i++) {
         json_open_object(out, NULL);
         json_put_string(out, "name", ischia_presets[i].name);
-        json_put_string(out, "description", ischia_presets[i].description);
+        json_put_string(out, "description", words_get(language, preset_words[i]));
         write_preset_group(out, "skin", &ischia_presets[i]);
         write_preset_group(out, "model", &ischia_presets[i]);
         json_close_object(out);
@@ -99,8 +104,9 @@ static void write_presets(struct json_out *out)
     json_close_array(out);
 }
 
-static void write_resolutions(struct json_out *out)
+static void write_resolutions(struct json_out *out, enum language language)
 {
+    (void)language;
     json_open_array(out, "resolutions");
     for (int i = 0; i < ISCHIA_RESOLUTION_COUNT; i++) {
         json_open_object(out, NULL);
@@ -112,23 +118,24 @@ static void write_resolutions(struct json_out *out)
 }
 
 /* What goes with a side: who, which and when. */
-static void write_fields(struct json_out *out)
+static void write_fields(struct json_out *out, enum language language)
 {
     static const struct {
-        const char *key, *description, *pattern;
+        const char *key;
+        enum word description;
+        const char *pattern;
         int max_length;
     } fields[] = {
-        {"subject", "Pseudonymous id of the person; never a name.", "^[A-Za-z0-9._-]{1,64}$", 64},
-        {"side", "Which ischium.", "^(left|right)$", 5},
-        {"measured_at", "When the inputs were measured: an RFC 3339 date or time.", NULL,
-         ISCHIA_MEASURED_AT_BYTES - 1},
-        {"label", "Free text of your own.", NULL, ISCHIA_LABEL_CHARACTERS_MAX},
+        {"subject", WORD_DAEMON_FIELD_SUBJECT, "^[A-Za-z0-9._-]{1,64}$", 64},
+        {"side", WORD_DAEMON_FIELD_SIDE, "^(left|right)$", 5},
+        {"measured_at", WORD_DAEMON_FIELD_MEASURED_AT, NULL, ISCHIA_MEASURED_AT_BYTES - 1},
+        {"label", WORD_DAEMON_FIELD_LABEL, NULL, ISCHIA_LABEL_CHARACTERS_MAX},
     };
     json_open_array(out, "fields");
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
         json_open_object(out, NULL);
         json_put_string(out, "key", fields[i].key);
-        json_put_string(out, "description", fields[i].description);
+        json_put_string(out, "description", words_get(language, fields[i].description));
         json_put_string(out, "pattern", fields[i].pattern);
         json_put_integer(out, "max_length", fields[i].max_length);
         json_close_object(out);
@@ -136,7 +143,7 @@ static void write_fields(struct json_out *out)
     json_close_array(out);
 }
 
-static void write_risk(struct json_out *out)
+static void write_risk(struct json_out *out, enum language language)
 {
     json_open_object(out, "thresholds");
     json_put_number(out, "E_shear", ISCHIA_E_SHEAR_THRESHOLD);
@@ -147,25 +154,27 @@ static void write_risk(struct json_out *out)
     for (int i = 0; i < RISK_BAND_COUNT; i++) {
         json_open_object(out, NULL);
         json_put_string(out, "name", risk_bands[i].name);
-        json_put_string(out, "headline", risk_bands[i].headline);
+        json_put_string(out, "headline", words_get(language, risk_bands[i].headline));
         json_close_object(out);
     }
     json_close_array(out);
     json_open_array(out, "caveats");
-    for (int i = 0; i < RISK_CAVEAT_COUNT; i++) json_put_string(out, NULL, risk_caveats[i]);
+    for (size_t i = 0; i < RISK_CAVEAT_COUNT; i++)
+        json_put_string(out, NULL, words_get(language, risk_caveats[i]));
     json_close_array(out);
 }
 
-enum ischia_code parameters_doc_text(char **ret_text, int indent, struct ischia_error *err)
+enum ischia_code parameters_doc_text(char **ret_text, enum language language, int indent,
+                                     struct ischia_error *err)
 {
-    static void (*const parts[])(struct json_out *) = {
+    static void (*const parts[])(struct json_out *, enum language) = {
         write_model,       write_parameters, write_options, write_presets,
         write_resolutions, write_fields,     write_risk,
     };
     struct json_out out;
     json_out_init(&out, indent);
     json_open_object(&out, NULL);
-    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) parts[i](&out);
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) parts[i](&out, language);
     json_close_object(&out);
     return json_out_take(&out, ret_text, NULL, err);
 }

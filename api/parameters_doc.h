@@ -2,6 +2,7 @@
 #ifndef ISCHIA_API_PARAMETERS_DOC_H
 #define ISCHIA_API_PARAMETERS_DOC_H
 
+#include "api/words.h"
 #include "solver/error.h"
 
 /*
@@ -21,7 +22,7 @@
  * }
  * The whole object as one text, the caller's to free. indent as json_out.
  */
-ISCHIA_MUST_CHECK enum ischia_code parameters_doc_text(char **ret_text, int indent,
-                                                       struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code parameters_doc_text(char **ret_text, enum language language,
+                                                       int indent, struct ischia_error *err);
 
 #endif

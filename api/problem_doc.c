@@ -10,33 +10,34 @@
 #include "api/fields.h"
 
 const struct problem_info problem_kinds[PROBLEM_KIND_COUNT] = {
-    [PROBLEM_NOT_JSON] = {"/docs#problem-not-json", "The body cannot be read", 400},
-    [PROBLEM_BAD_REQUEST] = {"/docs#problem-bad-request", "The request is malformed", 400},
-    [PROBLEM_UNAUTHORIZED] = {"/docs#problem-unauthorized", "No valid credentials", 401},
-    [PROBLEM_FORBIDDEN] = {"/docs#problem-forbidden", "Not allowed", 403},
-    [PROBLEM_NOT_FOUND] = {"/docs#problem-not-found", "Nothing is here", 404},
-    [PROBLEM_METHOD] = {"/docs#problem-method", "The method does not apply here", 405},
-    [PROBLEM_NOT_ACCEPTABLE] = {"/docs#problem-not-acceptable", "No such representation", 406},
-    [PROBLEM_TIMEOUT] = {"/docs#problem-timeout", "The request did not arrive in time", 408},
-    [PROBLEM_CONFLICT] = {"/docs#problem-conflict", "Not possible in the present state", 409},
-    [PROBLEM_PRECONDITION] = {"/docs#problem-precondition", "Data are missing", 412},
-    [PROBLEM_TOO_LARGE] = {"/docs#problem-too-large", "The body is too large", 413},
-    [PROBLEM_MEDIA_TYPE_WRONG] = {"/docs#problem-media-type", "The media type is not accepted",
-                                  415},
-    [PROBLEM_INVALID] = {"/docs#problem-invalid", "The input is not acceptable", 422},
-    [PROBLEM_IDEMPOTENCY] = {"/docs#problem-idempotency", "The idempotency key was used before",
-                             422},
-    [PROBLEM_QUEUE_FULL] = {"/docs#problem-queue-full", "The queue is full", 429},
-    [PROBLEM_RATE] = {"/docs#problem-rate", "Too many requests", 429},
-    [PROBLEM_HEADERS_TOO_LARGE] = {"/docs#problem-headers-too-large", "The headers are too large",
-                                   431},
-    [PROBLEM_INTERNAL] = {"/docs#problem-internal", "The server failed", 500},
-    [PROBLEM_UNAVAILABLE] = {"/docs#problem-unavailable", "The service is not available", 503},
-    [PROBLEM_STORAGE] = {"/docs#problem-storage", "There is no room to store it", 507},
-    [PROBLEM_NOT_CONVERGED] = {"/docs#problem-not-converged", "The solve did not converge", 422},
-    [PROBLEM_OUT_OF_MEMORY] = {"/docs#problem-out-of-memory", "Out of memory", 503},
-    [PROBLEM_TIME_LIMIT] = {"/docs#problem-time-limit", "The solve took too long", 504},
-    [PROBLEM_WORKER_DIED] = {"/docs#problem-worker-died", "The solver process ended", 500},
+    [PROBLEM_NOT_JSON] = {"/docs#problem-not-json", WORD_DAEMON_PROBLEM_NOT_JSON, 400},
+    [PROBLEM_BAD_REQUEST] = {"/docs#problem-bad-request", WORD_DAEMON_PROBLEM_BAD_REQUEST, 400},
+    [PROBLEM_UNAUTHORIZED] = {"/docs#problem-unauthorized", WORD_DAEMON_PROBLEM_UNAUTHORIZED, 401},
+    [PROBLEM_FORBIDDEN] = {"/docs#problem-forbidden", WORD_DAEMON_PROBLEM_FORBIDDEN, 403},
+    [PROBLEM_NOT_FOUND] = {"/docs#problem-not-found", WORD_DAEMON_PROBLEM_NOT_FOUND, 404},
+    [PROBLEM_METHOD] = {"/docs#problem-method", WORD_DAEMON_PROBLEM_METHOD, 405},
+    [PROBLEM_NOT_ACCEPTABLE] = {"/docs#problem-not-acceptable", WORD_DAEMON_PROBLEM_NOT_ACCEPTABLE,
+                                406},
+    [PROBLEM_TIMEOUT] = {"/docs#problem-timeout", WORD_DAEMON_PROBLEM_TIMEOUT, 408},
+    [PROBLEM_CONFLICT] = {"/docs#problem-conflict", WORD_DAEMON_PROBLEM_CONFLICT, 409},
+    [PROBLEM_PRECONDITION] = {"/docs#problem-precondition", WORD_DAEMON_PROBLEM_PRECONDITION, 412},
+    [PROBLEM_TOO_LARGE] = {"/docs#problem-too-large", WORD_DAEMON_PROBLEM_TOO_LARGE, 413},
+    [PROBLEM_MEDIA_TYPE_WRONG] = {"/docs#problem-media-type", WORD_DAEMON_PROBLEM_MEDIA_TYPE, 415},
+    [PROBLEM_INVALID] = {"/docs#problem-invalid", WORD_DAEMON_PROBLEM_INVALID, 422},
+    [PROBLEM_IDEMPOTENCY] = {"/docs#problem-idempotency", WORD_DAEMON_PROBLEM_IDEMPOTENCY, 422},
+    [PROBLEM_QUEUE_FULL] = {"/docs#problem-queue-full", WORD_DAEMON_PROBLEM_QUEUE_FULL, 429},
+    [PROBLEM_RATE] = {"/docs#problem-rate", WORD_DAEMON_PROBLEM_RATE, 429},
+    [PROBLEM_HEADERS_TOO_LARGE] = {"/docs#problem-headers-too-large",
+                                   WORD_DAEMON_PROBLEM_HEADERS_TOO_LARGE, 431},
+    [PROBLEM_INTERNAL] = {"/docs#problem-internal", WORD_DAEMON_PROBLEM_INTERNAL, 500},
+    [PROBLEM_UNAVAILABLE] = {"/docs#problem-unavailable", WORD_DAEMON_PROBLEM_UNAVAILABLE, 503},
+    [PROBLEM_STORAGE] = {"/docs#problem-storage", WORD_DAEMON_PROBLEM_STORAGE, 507},
+    [PROBLEM_NOT_CONVERGED] = {"/docs#problem-not-converged", WORD_DAEMON_PROBLEM_NOT_CONVERGED,
+                               422},
+    [PROBLEM_OUT_OF_MEMORY] = {"/docs#problem-out-of-memory", WORD_DAEMON_PROBLEM_OUT_OF_MEMORY,
+                               503},
+    [PROBLEM_TIME_LIMIT] = {"/docs#problem-time-limit", WORD_DAEMON_PROBLEM_TIME_LIMIT, 504},
+    [PROBLEM_WORKER_DIED] = {"/docs#problem-worker-died", WORD_DAEMON_PROBLEM_WORKER_DIED, 500},
 };
 
 /* ---- making one ---- */
@@ -54,6 +55,14 @@ void problem_init(struct problem *ret, enum problem_kind kind, const char *forma
     va_start(arguments, format);
     (void)vsnprintf(ret->detail, sizeof ret->detail, format, arguments);
     va_end(arguments);
+}
+
+void problem_say(struct problem *ret, enum problem_kind kind, enum language language,
+                 enum word word, const struct word_value *values)
+{
+    clear(ret, kind);
+    ret->language = language;
+    (void)words_fill(ret->detail, sizeof ret->detail, language, word, values);
 }
 
 enum problem_kind problem_kind_of(enum ischia_code code)
@@ -106,12 +115,12 @@ void problem_from_result(struct problem *ret, const struct ischia_case *c,
 void problem_from_faults(struct problem *ret, const struct doc_faults *faults)
 {
     const size_t count = faults->count + faults->dropped;
-    problem_init(ret, PROBLEM_INVALID, "%zu %s not acceptable", count,
-                 count == 1 ? "value is" : "values are");
-    if (faults->dropped > 0)
-        problem_init(ret, PROBLEM_INVALID,
-                     "%zu values are not acceptable; the first %zu are listed", count,
-                     faults->count);
+    const enum word word = faults->dropped > 0 ? WORD_DAEMON_PROBLEM_FAULTS_LISTED
+                           : count == 1        ? WORD_DAEMON_PROBLEM_FAULT
+                                               : WORD_DAEMON_PROBLEM_FAULTS;
+    problem_say(
+        ret, PROBLEM_INVALID, faults->language, word,
+        WORDS(word_count("n", (long long)count), word_count("listed", (long long)faults->count)));
     ret->faults = *faults;
 }
 
@@ -140,7 +149,8 @@ static bool read_type(const struct json *value, void *base)
 
 static void write_title(struct json_out *out, const char *key, const void *base)
 {
-    json_put_string(out, key, info_of(base)->title);
+    const struct problem *problem = base;
+    json_put_string(out, key, words_get(problem->language, info_of(base)->title));
 }
 
 static void write_status(struct json_out *out, const char *key, const void *base)

@@ -43,7 +43,7 @@ enum problem_kind {
 
 struct problem_info {
     const char *type; /* URI reference: the anchor that explains it in the daemon's docs page */
-    const char *title;
+    enum word title;
     int status;
 };
 extern const struct problem_info problem_kinds[PROBLEM_KIND_COUNT];
@@ -55,11 +55,16 @@ struct problem {
     char reason[24];                         /* ischia_reason_name of a solve that ended; ""  */
     double last_converged_fraction;          /* of F, 0 ... 1; NaN: does not apply            */
     struct doc_faults faults;                /* "errors", only written when there are some    */
+    enum language language;                  /* of the title                                  */
 };
 
-/* A problem with a detail in words (printf-style) and nothing else. */
+/* A problem with a detail in English (printf-style) and nothing else. */
 __attribute__((format(printf, 3, 4))) void problem_init(struct problem *ret, enum problem_kind kind,
                                                         const char *format, ...);
+
+/* A problem with title and detail in the words of a language. */
+void problem_say(struct problem *ret, enum problem_kind kind, enum language language,
+                 enum word word, const struct word_value *values);
 
 /* The problem of a call that failed: by err->code, with its message (see problem_kind_of). */
 void problem_from_error(struct problem *ret, const struct ischia_error *err);
@@ -69,7 +74,7 @@ enum problem_kind problem_kind_of(enum ischia_code code);
 void problem_from_result(struct problem *ret, const struct ischia_case *c,
                          const struct ischia_result *result);
 
-/* The problem of a document with faults (copied). */
+/* The problem of a document with faults (copied), in their language. */
 void problem_from_faults(struct problem *ret, const struct doc_faults *faults);
 
 /* Writes the members of the problem object that is open in out. */

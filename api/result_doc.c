@@ -135,15 +135,15 @@ static void write_risk(struct json_out *out, const char *key, const void *base)
         json_put_null(out, key);
         return;
     }
-    risk_assess(&risk, &view->c, &view->result);
+    risk_assess(&risk, &view->c, &view->result, LANGUAGE_EN);
     json_open_object(out, key);
     json_put_string(out, "band", risk_bands[risk.band].name);
-    json_put_string(out, "headline", risk_bands[risk.band].headline);
+    json_put_string(out, "headline", risk_headline(risk.band));
     json_open_array(out, "reasons");
     for (int i = 0; i < risk.reason_count; i++) json_put_string(out, NULL, risk.reason[i]);
     json_close_array(out);
     json_open_array(out, "caveats");
-    for (int i = 0; i < RISK_CAVEAT_COUNT; i++) json_put_string(out, NULL, risk_caveats[i]);
+    for (size_t i = 0; i < RISK_CAVEAT_COUNT; i++) json_put_string(out, NULL, risk_caveat(i));
     json_close_array(out);
     json_close_object(out);
 }

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/case_words.h"
 #include "api/csv.h"
 
 #define AT(member) offsetof(struct ischia_result, member)
@@ -86,10 +87,12 @@ void study_response_put(struct text_out *out, const struct ischia_result *result
 
 void study_response_put_refused(struct text_out *out, const struct ischia_case *c, int count)
 {
-    struct ischia_fault faults[ISCHIA_CASE_FAULTS_MAX];
+    struct ischia_case_fault faults[ISCHIA_CASE_FAULTS_MAX];
+    struct ischia_fault first;
     const size_t n = ischia_case_faults(c, faults);
     assert(n > 0);
+    case_fault_words(&first, LANGUAGE_EN, c, &faults[0]);
     csv_put_text(out, "refused", true);
-    put_reason(out, faults[0].code, faults[0].detail);
+    put_reason(out, first.code, first.detail);
     for (int i = 0; i < count; i++) csv_put_number(out, (double)NAN, false);
 }

@@ -15,8 +15,9 @@
  *
  * The messages (see docs/WORKER.md):
  *   to the worker    {"op":"solve","job":N,"case":{...}}
- *                    {"op":"render","job":N,"as":"vtu"|"svg","case":{...}}  then the field's blob
- *   from the worker  {"say":"hello","protocol":1,"program":"...","model":"...","model_version":1}
+ *                    {"op":"render","job":N,"as":"vtu"|"svg","lang":"en",
+ *                     "case":{...}}  then the field's blob
+ *   from the worker  {"say":"hello","protocol":2,"program":"...","model":"...","model_version":1}
  *                    {"say":"progress","job":N,"fraction":0.5,"load_step":3,"newton_iteration":2,
  *                     "F_N":100.0,"message":"..."}
  *                    {"say":"result","job":N}   then the result object as a line, then the blob
@@ -27,7 +28,7 @@
  * Whether a line is JSON at all is the business of api/json; here it only begins with '{'.
  */
 
-enum { FRAME_PROTOCOL_VERSION = 1 };
+enum { FRAME_PROTOCOL_VERSION = 2 };
 
 struct frame_limits {
     size_t json_max; /* bytes of a line without its newline      */

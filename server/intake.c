@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/case_words.h"
 #include "api/fhir.h"
 #include "api/problem_doc.h"
 #include "api/result_doc.h"
@@ -60,7 +61,7 @@ static enum ischia_code warnings_text(const struct ischia_request *request, char
 {
     struct ischia_fault warnings[ISCHIA_PARAM_COUNT];
     struct json_out out;
-    const size_t count = ischia_case_warnings(&request->values, warnings);
+    const size_t count = case_warnings(&request->values, LANGUAGE_EN, warnings);
     json_out_init(&out, 0);
     json_open_array(&out, NULL);
     for (size_t i = 0; i < count; i++) {
@@ -160,6 +161,6 @@ enum ischia_code intake_record(struct record *ret, const struct store_assessment
     CHECK(row->result_json != NULL, err, ISCHIA_E_STATE, "the result was not read");
     TRY(result_doc_read(&ret->result, NULL, row->result_json, strlen(row->result_json),
                         &json_limits_stored, err));
-    risk_assess(&ret->risk, &ret->request.values, &ret->result);
+    risk_assess(&ret->risk, &ret->request.values, &ret->result, LANGUAGE_EN);
     return ISCHIA_OK;
 }

@@ -62,7 +62,7 @@ static const struct {
     [MESSAGE_PROBLEM] = {"say", "problem", {JOB, END}},
     [MESSAGE_RENDERED] = {"say", "rendered", {JOB, END}},
     [MESSAGE_SOLVE] = {"op", "solve", {JOB, CASE, END}},
-    [MESSAGE_RENDER] = {"op", "render", {JOB, TEXT("as", as), CASE, END}},
+    [MESSAGE_RENDER] = {"op", "render", {JOB, TEXT("as", as), TEXT("lang", language), CASE, END}},
 };
 
 /* ------------------------------------------------------------------------------- writing */

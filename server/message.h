@@ -38,7 +38,7 @@ struct message {
     int load_step, newton_iteration;
     char text[MESSAGE_TEXT_BYTES];
     /* render */
-    char as[MESSAGE_TEXT_BYTES];
+    char as[MESSAGE_TEXT_BYTES], language[MESSAGE_TEXT_BYTES];
     /* solve, render: the case object. Writing: what is sent. Reading: malloc'ed, the caller's. */
     char *case_json;
 };

@@ -736,13 +736,14 @@ static enum ischia_code enqueue_render(struct pool *pool, struct render *render)
     return code;
 }
 
-enum ischia_code pool_render(struct pool *pool, enum pool_render_kind kind, const char *case_json,
-                             const unsigned char *field, size_t field_size, pool_render_done *done,
-                             void *context, struct ischia_error *err)
+enum ischia_code pool_render(struct pool *pool, enum pool_render_kind kind, const char *language,
+                             const char *case_json, const unsigned char *field, size_t field_size,
+                             pool_render_done *done, void *context, struct ischia_error *err)
 {
     struct render *render = make_render(case_json, field, field_size);
     CHECK(render != NULL, err, ISCHIA_E_MEMORY, "no memory for a drawing");
     render->kind = kind;
+    render->language = language;
     render->done = done;
     render->context = context;
     render->expires_ms = worker_now_ms() + 2 * (int64_t)pool->options.render_deadline_ms;

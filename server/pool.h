@@ -132,12 +132,13 @@ extern const char *const pool_render_names[POOL_RENDER_KIND_COUNT]; /* "vtu", "s
 typedef void pool_render_done(void *context, enum ischia_code code, const unsigned char *bytes,
                               size_t size, const struct ischia_error *err);
 
-/* Asks a render worker to draw; copies its inputs; does not wait. done is called exactly once if
- * and only if this returns ISCHIA_OK. ISCHIA_E_LIMIT: too many wait. ISCHIA_E_STATE: stopping. */
-ISCHIA_MUST_CHECK enum ischia_code pool_render(struct pool *pool, enum pool_render_kind kind,
-                                               const char *case_json, const unsigned char *field,
-                                               size_t field_size, pool_render_done *done,
-                                               void *context, struct ischia_error *err);
+/* Asks a render worker to draw, with words of the language (its tag, static storage); copies its
+ * other inputs; does not wait. done is called exactly once if and only if this returns ISCHIA_OK.
+ * ISCHIA_E_LIMIT: too many wait. ISCHIA_E_STATE: stopping. */
+ISCHIA_MUST_CHECK enum ischia_code
+pool_render(struct pool *pool, enum pool_render_kind kind, const char *language,
+            const char *case_json, const unsigned char *field, size_t field_size,
+            pool_render_done *done, void *context, struct ischia_error *err);
 
 enum { POOL_PROGRAM_BYTES = 96 };
 

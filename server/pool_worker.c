@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "server/pool_worker.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -200,6 +201,7 @@ enum ischia_code worker_put_render(struct worker *worker, struct ischia_error *e
     struct message message = {
         .kind = MESSAGE_RENDER, .job = next_number(worker), .case_json = render->case_json};
     (void)stpcpy(message.as, pool_render_names[render->kind]);
+    (void)snprintf(message.language, sizeof message.language, "%s", render->language);
     TRY(put_message(worker, &message, err));
     return frame_put_blob(&worker->writer, render->field, render->field_size, err);
 }

@@ -14,6 +14,7 @@
 /* A drawing that was asked for. */
 struct render {
     enum pool_render_kind kind;
+    const char *language; /* static storage */
     char *case_json;
     unsigned char *field;
     size_t field_size;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/case_words.h"
 #include "api/cohort_rows.h"
 #include "api/json.h"
 #include "api/problem_doc.h"
@@ -93,7 +94,8 @@ static enum ischia_code add_design_point(struct studies_new *study, const struct
                                          size_t row, struct ischia_error *err)
 {
     struct ischia_request request;
-    struct ischia_fault faults[ISCHIA_CASE_FAULTS_MAX];
+    struct ischia_case_fault faults[ISCHIA_CASE_FAULTS_MAX];
+    struct ischia_fault words = {0};
     struct problem problem;
     struct text_out line;
     char *cells = NULL;
@@ -105,8 +107,9 @@ static enum ischia_code add_design_point(struct studies_new *study, const struct
     TRY(cells_of_line(&line, input_columns(plan), &cells, err));
     if (ischia_case_faults(&request.values, faults) == 0)
         return add_point(study, cells, &request, NULL, err);
-    problem_init(&problem, PROBLEM_INVALID, "%s", faults[0].detail);
-    (void)snprintf(problem.reason, sizeof problem.reason, "%s", faults[0].code);
+    case_fault_words(&words, LANGUAGE_EN, &request.values, &faults[0]);
+    problem_init(&problem, PROBLEM_INVALID, "%s", words.detail);
+    (void)snprintf(problem.reason, sizeof problem.reason, "%s", words.code);
     return add_point(study, cells, NULL, &problem, err);
 }
 

@@ -8,8 +8,9 @@
 /*
  * One case: the seven measured numbers of one side, and the options of the model.
  *
- * The tables here are the only place where names, units, limits and defaults live; the JSON and
- * CSV readers, the form, GET /v1/parameters and the docs all iterate them.
+ * The tables here are the only place where keys, units, limits and defaults live; the JSON and CSV
+ * readers, the form, GET /v1/parameters and the docs all iterate them. What people call the inputs
+ * stands with all other words, in words/.
  */
 
 /* The seven inputs, in the order in which the paper and every table of ours list them. */
@@ -45,8 +46,6 @@ struct ischia_param_info {
     double accepted_max;
     double studied_min; /* outside [studied_min, studied_max]: solved, with a warning      */
     double studied_max;
-    const char *description; /* one plain sentence, for forms and docs                          */
-    const char *name;        /* what a form calls it, in two or three words                     */
 };
 
 struct ischia_option_info {
@@ -56,7 +55,6 @@ struct ischia_option_info {
     double accepted_min;
     double accepted_max;
     double default_value;
-    const char *description;
 };
 
 extern const struct ischia_param_info ischia_params[ISCHIA_PARAM_COUNT];
@@ -66,7 +64,6 @@ extern const char *const ischia_resolution_names[ISCHIA_RESOLUTION_COUNT];
 /* Named sets of options; [0] is "default". A preset gives every option a value. */
 struct ischia_preset {
     const char *name;
-    const char *description;
     double option[ISCHIA_OPTION_COUNT];
 };
 extern const struct ischia_preset ischia_presets[];
@@ -90,24 +87,26 @@ struct ischia_case ischia_case_default(void);
  * readers of documents report the faults one by one instead (ischia_case_faults). */
 bool ischia_case_is_valid(const struct ischia_case *c);
 
-/*
- * One fault of a case, as a reader reports it. `code` is "out_of_range", "missing", or
- * "inconsistent"; detail names field, value and what is accepted, e.g.
- * "muM is 80 kPa; accepted 0.5 to 30 kPa". pointer is an RFC 6901 JSON pointer: "/muM", "/skin/mu".
- */
-struct ischia_fault {
-    char pointer[48];
-    char code[24];
-    char detail[160];
+/* What is wrong with a case, or worth a warning. The words for it are those of api/case_words.h. */
+enum ischia_case_fault_kind {
+    ISCHIA_CASE_MISSING,      /* a number nobody set                                          */
+    ISCHIA_CASE_OUT_OF_RANGE, /* a number outside `accepted`                                  */
+    ISCHIA_CASE_ORDER,        /* R2 is smaller than R1                                        */
+    ISCHIA_CASE_UNSTUDIED,    /* a warning: an input outside `studied`                        */
+    ISCHIA_CASE_FAULT_KIND_COUNT
+};
+struct ischia_case_fault {
+    enum ischia_case_fault_kind kind;
+    int index; /* an enum ischia_param, or ISCHIA_PARAM_COUNT + an enum ischia_option           */
 };
 enum { ISCHIA_CASE_FAULTS_MAX = ISCHIA_PARAM_COUNT + ISCHIA_OPTION_COUNT + 1 };
 
-/* Writes all faults of c (a NaN input is "missing") and returns how many there are. */
+/* Writes all faults of c (a NaN input is missing) and returns how many there are. */
 size_t ischia_case_faults(const struct ischia_case *c,
-                          struct ischia_fault ret_faults[ISCHIA_CASE_FAULTS_MAX]);
+                          struct ischia_case_fault ret_faults[ISCHIA_CASE_FAULTS_MAX]);
 
-/* Writes the "outside_study_range" warnings of a valid case and returns how many there are. */
+/* Writes the warnings of a valid case, by input, and returns how many there are. */
 size_t ischia_case_warnings(const struct ischia_case *c,
-                            struct ischia_fault ret_warnings[ISCHIA_PARAM_COUNT]);
+                            struct ischia_case_fault ret_warnings[ISCHIA_PARAM_COUNT]);
 
 #endif

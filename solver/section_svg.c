@@ -17,8 +17,8 @@
 #include "solver/strain.h"
 
 /* The colour scale: bands of equal width, the last open to all higher strains. */
-static const double band_width = 0.125;
 enum { BANDS = 16 };
+static const double band_width = ISCHIA_SECTION_E_SHEAR_MAX / BANDS;
 
 /* What a half is painted with, from the bottom up. */
 enum layer {
@@ -41,11 +41,6 @@ static const char *const tissue_fill[TISSUE_COUNT] = {
 };
 static const char bone_fill[] = "#f3f4f5", seat_fill[] = "#5b6670", ink[] = "#1b1b1b";
 
-static const char *const panel_title[SECTION_PLANE_COUNT] = {
-    [SECTION_Y0] = "section y = 0 (bone radius R2)",
-    [SECTION_X0] = "section x = 0 (bone radius R1)",
-};
-
 struct panel {
     struct section section;
     double reach_mm; /* how far the tissue reaches outward */
@@ -55,6 +50,7 @@ struct panel {
 struct figure {
     FILE *out;
     const struct ischia_case *c;
+    const struct ischia_section_labels *labels;
     const struct mesh *mesh;
     const double *displacement_mm;
     double *shear; /* [node_count] recovered */
@@ -63,6 +59,53 @@ struct figure {
     double seat_y; /* px, of z = 0 */
     double height;
 };
+
+/* --- words ------------------------------------------------------------------------------------ */
+
+enum { NUMBER_BYTES = 32 };
+
+static void put_words(const struct figure *f, const char *text)
+{
+    for (; *text != '\0'; text++) {
+        const char *entity = *text == '&' ? "&amp;" : *text == '<' ? "&lt;" : NULL;
+        if (entity != NULL)
+            (void)fputs(entity, f->out);
+        else
+            (void)fputc(*text, f->out);
+    }
+}
+
+static void put_element(const struct figure *f, const char *opening, const char *text,
+                        const char *name)
+{
+    (void)fprintf(f->out, "<%s>", opening);
+    put_words(f, text);
+    (void)fprintf(f->out, "</%s>\n", name);
+}
+
+/* "E" with its index, below the line: what follows it has to come up again. */
+static void put_symbol(const struct figure *f)
+{
+    (void)fputs(" E<tspan font-size=\"10\" dy=\"3\">", f->out);
+    put_words(f, f->labels->index);
+    (void)fputs("</tspan>", f->out);
+}
+
+/* A number of ours as the reader writes it. */
+static const char *with_mark(const struct figure *f, char number[NUMBER_BYTES])
+{
+    char *point = strchr(number, '.');
+    if (point != NULL) *point = f->labels->decimal_mark;
+    return number;
+}
+
+/* Of UTF-8, without the bytes that continue a character. */
+static size_t letters(const char *text)
+{
+    size_t count = 0;
+    for (; *text != '\0'; text++) count += ((unsigned char)*text & 0xC0) != 0x80;
+    return count;
+}
 
 /* --- geometry --------------------------------------------------------------------------------- */
 
@@ -292,8 +335,10 @@ static void put_panel(const struct figure *f, int s, double left)
     const double half = p->reach_mm * f->px_per_mm, centre = left + half;
     (void)fprintf(f->out,
                   "<text x=\"%.1f\" y=\"%.1f\"><tspan font-weight=\"bold\">%c</tspan>"
-                  "<tspan dx=\"8\">%s</tspan></text>\n",
-                  left, head_height - 14, 'a' + s, panel_title[s]);
+                  "<tspan dx=\"8\">",
+                  left, head_height - 14, 'a' + s);
+    put_words(f, f->labels->plane[s]);
+    (void)fputs("</tspan></text>\n", f->out);
     (void)fprintf(f->out,
                   "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\"/>\n",
                   left, f->seat_y, 2 * half, seat_height_mm * f->px_per_mm, seat_fill);
@@ -316,41 +361,42 @@ static void put_opening(const struct figure *f)
                   "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
                   "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" "
                   "width=\"%.0f\" height=\"%.0f\" role=\"img\" aria-labelledby=\"title desc\" "
-                  "font-family=\"Helvetica, Arial, sans-serif\" font-size=\"14\" fill=\"%s\">\n",
-                  page_width, ceil(f->height), page_width, ceil(f->height), ink);
-    (void)fprintf(f->out,
-                  "<title id=\"title\">Shear strain in the muscle under the ischium, deformed "
-                  "symmetry sections</title>\n"
-                  "<desc id=\"desc\">Two sections through the deformed tissue under one ischium, "
-                  "in the planes y = 0 and x = 0. The bone presses muscle, fat and skin on a flat "
-                  "seat. Muscle is coloured by Green-Lagrange shear strain from 0, light, to %.2f "
-                  "and more, dark; a black line with a white border marks the threshold %.2f."
-                  "</desc>\n<rect width=\"100%%\" height=\"100%%\" fill=\"#ffffff\"/>\n",
-                  BANDS * band_width, ISCHIA_E_SHEAR_THRESHOLD);
+                  "xml:lang=\"%s\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"14\" "
+                  "fill=\"%s\">\n",
+                  page_width, ceil(f->height), page_width, ceil(f->height), f->labels->language,
+                  ink);
+    put_element(f, "title id=\"title\"", f->labels->title, "title");
+    put_element(f, "desc id=\"desc\"", f->labels->description, "desc");
+    (void)fputs("<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n", f->out);
 }
 
 /* The seven inputs, in one line. */
 static void put_head(const struct figure *f)
 {
-    (void)fprintf(f->out,
-                  "<text x=\"%.1f\" y=\"26\" font-size=\"17\" font-weight=\"bold\">Shear strain in "
-                  "the muscle, deformed</text>\n<text x=\"%.1f\" y=\"46\" fill=\"#4a4a4a\">",
-                  margin, margin);
-    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
-        (void)fprintf(f->out, "%s%s %.4g %s", i == 0 ? "" : " · ", ischia_params[i].key,
-                      f->c->param[i], ischia_params[i].unit);
+    char value[NUMBER_BYTES];
+    (void)fprintf(f->out, "<text x=\"%.1f\" y=\"26\" font-size=\"17\" font-weight=\"bold\">",
+                  margin);
+    put_words(f, f->labels->heading);
+    (void)fprintf(f->out, "</text>\n<text x=\"%.1f\" y=\"46\" fill=\"#4a4a4a\">", margin);
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
+        (void)snprintf(value, sizeof value, "%.4g", f->c->param[i]);
+        (void)fprintf(f->out, "%s%s %s %s", i == 0 ? "" : " · ", ischia_params[i].key,
+                      with_mark(f, value), ischia_params[i].unit);
+    }
     (void)fputs("</text>\n", f->out);
 }
 
-enum { BAR_LEFT = 30, BAR_WIDTH = 430, BAR_HEIGHT = 16 };
+enum { BAR_LEFT = 30, BAR_WIDTH = 430, BAR_HEIGHT = 16, LEGEND_LEFT = 520 };
 
 static void put_bar_tick(const struct figure *f, double y, int band)
 {
     const double x = BAR_LEFT + (double)BAR_WIDTH * band / BANDS;
+    char value[NUMBER_BYTES];
+    (void)snprintf(value, sizeof value, "%.2f", band * band_width);
     (void)fprintf(f->out,
                   "<path d=\"M%.1f %.1fv5\" stroke=\"%s\"/><text x=\"%.1f\" y=\"%.1f\" "
-                  "text-anchor=\"middle\" font-size=\"12\">%.2f</text>\n",
-                  x, y + BAR_HEIGHT, ink, x, y + BAR_HEIGHT + 18, band * band_width);
+                  "text-anchor=\"middle\" font-size=\"12\">%s</text>\n",
+                  x, y + BAR_HEIGHT, ink, x, y + BAR_HEIGHT + 18, with_mark(f, value));
 }
 
 static void put_colour_bar(const struct figure *f, double y)
@@ -358,10 +404,10 @@ static void put_colour_bar(const struct figure *f, double y)
     const double width = (double)BAR_WIDTH / BANDS;
     const double threshold = BAR_LEFT + width * ISCHIA_E_SHEAR_THRESHOLD / band_width;
     unsigned char rgb[3];
-    (void)fprintf(f->out,
-                  "<text x=\"%d\" y=\"%.1f\">Green–Lagrange shear strain E<tspan font-size=\"10\" "
-                  "dy=\"3\">shear</tspan></text>\n",
-                  BAR_LEFT, y - 12);
+    (void)fprintf(f->out, "<text x=\"%d\" y=\"%.1f\">", BAR_LEFT, y - 12);
+    put_words(f, f->labels->strain);
+    put_symbol(f);
+    (void)fputs("</text>\n", f->out);
     /* Each band reaches to the end of the bar, under the next: no seams. */
     for (int band = 0; band < BANDS; band++) {
         const double rest = BAR_WIDTH - width * band;
@@ -379,30 +425,40 @@ static void put_colour_bar(const struct figure *f, double y)
                   threshold, y - 4, BAR_HEIGHT + 8, threshold, y - 4, BAR_HEIGHT + 8, ink);
 }
 
-static void put_swatch(const struct figure *f, double x, double y, const char *fill,
-                       const char *name)
+/* Returns where the next one begins. */
+static double put_swatch(const struct figure *f, double x, double y, const char *fill,
+                         const char *name)
 {
+    const double letter_width = 7.5;
     (void)fprintf(f->out,
                   "<rect x=\"%.1f\" y=\"%.1f\" width=\"18\" height=\"14\" fill=\"%s\" "
-                  "stroke=\"%s\" stroke-width=\"0.8\"/><text x=\"%.1f\" y=\"%.1f\">%s</text>\n",
-                  x, y, fill, ink, x + 25, y + 12, name);
+                  "stroke=\"%s\" stroke-width=\"0.8\"/><text x=\"%.1f\" y=\"%.1f\">",
+                  x, y, fill, ink, x + 25, y + 12);
+    put_words(f, name);
+    (void)fputs("</text>\n", f->out);
+    return x + 45 + letter_width * (double)letters(name);
 }
 
 static void put_legend(const struct figure *f, double y)
 {
     const struct {
         const char *fill, *name;
-    } swatches[] = {{bone_fill, "bone"},
-                    {tissue_fill[TISSUE_FAT], "fat"},
-                    {tissue_fill[TISSUE_SKIN], "skin"},
-                    {seat_fill, "seat"}};
+    } swatches[] = {{bone_fill, f->labels->bone},
+                    {tissue_fill[TISSUE_FAT], f->labels->fat},
+                    {tissue_fill[TISSUE_SKIN], f->labels->skin},
+                    {seat_fill, f->labels->seat}};
+    char value[NUMBER_BYTES];
+    double x = LEGEND_LEFT;
     for (size_t i = 0; i < sizeof swatches / sizeof swatches[0]; i++)
-        put_swatch(f, 520 + 75 * (double)i, y, swatches[i].fill, swatches[i].name);
+        x = put_swatch(f, x, y, swatches[i].fill, swatches[i].name);
+    (void)snprintf(value, sizeof value, "%.2f", ISCHIA_E_SHEAR_THRESHOLD);
     (void)fprintf(f->out,
-                  "<path d=\"M520 %.1fh18\" stroke=\"%s\" stroke-width=\"2\"/>"
-                  "<text x=\"545\" y=\"%.1f\">threshold of muscle damage, E<tspan font-size=\"10\" "
-                  "dy=\"3\">shear</tspan><tspan dx=\"4\" dy=\"-3\">= %.2f</tspan></text>\n",
-                  y + 31, ink, y + 36, ISCHIA_E_SHEAR_THRESHOLD);
+                  "<path d=\"M%d %.1fh18\" stroke=\"%s\" stroke-width=\"2\"/>"
+                  "<text x=\"%d\" y=\"%.1f\">",
+                  LEGEND_LEFT, y + 31, ink, LEGEND_LEFT + 25, y + 36);
+    put_words(f, f->labels->threshold);
+    put_symbol(f);
+    (void)fprintf(f->out, "<tspan dx=\"4\" dy=\"-3\">= %s</tspan></text>\n", with_mark(f, value));
 }
 
 static void put_scale_bar(const struct figure *f, double y)
@@ -443,9 +499,12 @@ static enum ischia_code recover(struct figure *f, struct ischia_error *err)
 }
 
 enum ischia_code section_svg_write(FILE *out, const struct ischia_case *c, const struct mesh *mesh,
-                                   const double *displacement_mm, struct ischia_error *err)
+                                   const double *displacement_mm,
+                                   const struct ischia_section_labels *labels,
+                                   struct ischia_error *err)
 {
-    struct figure f = {.out = out, .c = c, .mesh = mesh, .displacement_mm = displacement_mm};
+    struct figure f = {
+        .out = out, .c = c, .labels = labels, .mesh = mesh, .displacement_mm = displacement_mm};
     enum ischia_code code = recover(&f, err);
     for (int s = 0; code == ISCHIA_OK && s < SECTION_PLANE_COUNT; s++)
         code = section_init(&f.panel[s].section, mesh, (enum section_plane)s, err);

@@ -58,6 +58,20 @@ ischia_solve(struct ischia_solver *solver, const struct ischia_case *c,
 
 void ischia_field_finish(struct ischia_field *field); /* NULL and empty allowed */
 
+/* What the section's picture says, in the reader's language. All are needed, and borrowed. */
+struct ischia_section_labels {
+    const char *language;        /* its BCP 47 tag                                         */
+    const char *title, *heading; /* for those who hear the picture, and above it           */
+    const char *description;     /* for those who hear it: all that there is to see        */
+    const char *plane[2];        /* y = 0, x = 0                                           */
+    const char *strain, *index;  /* Green-Lagrange shear strain; the index of its symbol E */
+    const char *threshold;       /* in front of "E = 0.75"                                 */
+    const char *bone, *fat, *skin, *seat;
+    char decimal_mark;
+};
+/* Where the scale of colours ends, open to all higher strains. */
+#define ISCHIA_SECTION_E_SHEAR_MAX 2.0
+
 /*
  * Writers of a solved field; each rebuilds the mesh from the case. ISCHIA_E_INPUT when the field
  * does not fit the case's mesh, ISCHIA_E_IO when the stream fails. The stream stays the caller's.
@@ -65,9 +79,9 @@ void ischia_field_finish(struct ischia_field *field); /* NULL and empty allowed 
 ISCHIA_MUST_CHECK enum ischia_code ischia_write_vtu(FILE *out, const struct ischia_case *c,
                                                     const struct ischia_field *field,
                                                     struct ischia_error *err);
-ISCHIA_MUST_CHECK enum ischia_code ischia_write_section_svg(FILE *out, const struct ischia_case *c,
-                                                            const struct ischia_field *field,
-                                                            struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code
+ischia_write_section_svg(FILE *out, const struct ischia_case *c, const struct ischia_field *field,
+                         const struct ischia_section_labels *labels, struct ischia_error *err);
 /* The same mesh, materials, contact and load as an Abaqus/CalculiX input deck. */
 ISCHIA_MUST_CHECK enum ischia_code ischia_write_inp(FILE *out, const struct ischia_case *c,
                                                     struct ischia_error *err);

@@ -27,33 +27,37 @@ static enum ischia_code check_field(const struct ischia_field *field, const stru
     return ISCHIA_OK;
 }
 
-static enum ischia_code
-write_with_mesh(FILE *out, const struct ischia_case *c, const struct ischia_field *field,
-                enum ischia_code (*write)(FILE *out, const struct ischia_case *c,
-                                          const struct mesh *mesh, const double *displacement_mm,
-                                          struct ischia_error *err),
-                struct ischia_error *err)
+/* The mesh of the case, which the field must fit. *ret is the caller's to finish. */
+static enum ischia_code begin(struct mesh *ret, const struct ischia_case *c,
+                              const struct ischia_field *field, struct ischia_error *err)
 {
-    struct mesh mesh;
     assert(ischia_case_is_valid(c));
-    TRY(mesh_local_init(&mesh, c, &mesh_divisions[c->resolution], err));
-    enum ischia_code code = check_field(field, &mesh, err);
-    if (code == ISCHIA_OK) code = write(out, c, &mesh, field->displacement_mm, err);
-    mesh_finish(&mesh);
+    TRY(mesh_local_init(ret, c, &mesh_divisions[c->resolution], err));
+    const enum ischia_code code = check_field(field, ret, err);
+    if (code != ISCHIA_OK) mesh_finish(ret);
     return code;
 }
 
 enum ischia_code ischia_write_vtu(FILE *out, const struct ischia_case *c,
                                   const struct ischia_field *field, struct ischia_error *err)
 {
-    return write_with_mesh(out, c, field, vtu_write, err);
+    struct mesh mesh;
+    TRY(begin(&mesh, c, field, err));
+    const enum ischia_code code = vtu_write(out, c, &mesh, field->displacement_mm, err);
+    mesh_finish(&mesh);
+    return code;
 }
 
-enum ischia_code ischia_write_section_svg(FILE *out, const struct ischia_case *c,
-                                          const struct ischia_field *field,
-                                          struct ischia_error *err)
+enum ischia_code
+ischia_write_section_svg(FILE *out, const struct ischia_case *c, const struct ischia_field *field,
+                         const struct ischia_section_labels *labels, struct ischia_error *err)
 {
-    return write_with_mesh(out, c, field, section_svg_write, err);
+    struct mesh mesh;
+    TRY(begin(&mesh, c, field, err));
+    const enum ischia_code code =
+        section_svg_write(out, c, &mesh, field->displacement_mm, labels, err);
+    mesh_finish(&mesh);
+    return code;
 }
 
 static struct inp_model model_of(const struct ischia_case *c)

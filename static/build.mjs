@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Bundles the clinic page into dist/: index.html, assets/app.js, assets/app.css and, as a file of
+// Bundles the clinic page into dist/: index.html and its like in other languages, assets/app.js, assets/app.css and, as a file of
 // its own that is fetched only when somebody opens the 3-D view, assets/view3d.js. The names carry
 // no hash: the daemon serves them with an ETag, so a browser asks once and keeps what it has.
 import { build } from 'esbuild';
@@ -40,6 +40,22 @@ const table2 = {
   },
 };
 
+/* The words that the page has a use for, of words/LANGUAGE.json. */
+const page_words = (text) =>
+  Object.fromEntries(
+    Object.entries(JSON.parse(text)).filter(([key]) => !key.startsWith('daemon.')),
+  );
+
+const words = {
+  name: 'words',
+  setup(bundle) {
+    bundle.onLoad({ filter: /[/\\]words[/\\]\w+\.json$/ }, async (a) => ({
+      contents: JSON.stringify(page_words(await readFile(a.path, 'utf8'))),
+      loader: 'json',
+    }));
+  },
+};
+
 const common = {
   bundle: true,
   minify: true,
@@ -50,7 +66,7 @@ const common = {
   legalComments: 'none' /* licences.txt has them whole */,
   metafile: true,
   logLevel: 'warning',
-  plugins: [table2],
+  plugins: [table2, words],
 };
 
 async function first_page_bytes() {
@@ -81,6 +97,39 @@ async function write_licences(metafiles) {
 const bundle = async (entry, out) =>
   (await build({ ...common, entryPoints: [join(here, entry)], outfile: join(dist, out) })).metafile;
 
+const html = (text) =>
+  text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]);
+
+/* index.html in one language: {{key}}, or {{key|name=value|…}} for a string that names values. */
+function in_language(template, tag, all) {
+  const mark = all[tag]['number.decimal'];
+  const link = ([code, of]) =>
+    `<a href="/?lang=${code}" lang="${code}" hreflang="${code}"` +
+    `${code === tag ? ' aria-current="true"' : ''}>${html(of['language.name'])}</a>`;
+  const parts = { language: tag, languages: Object.entries(all).map(link).join(' ') };
+  return template.replace(/\{\{([^{}]+)\}\}/g, (_, inside) => {
+    const [key, ...given] = inside.split('|');
+    if (key in parts) return parts[key];
+    const values = Object.fromEntries(given.map((g) => g.split('=')));
+    if (all[tag][key] === undefined) throw new Error(`index.html: no word ${key}`);
+    return html(all[tag][key].replace(/\{(\w+)\}/g, (__, name) => values[name].replace('.', mark)));
+  });
+}
+
+/* index.html is English, index.fr.html French: the daemon sends the one that the reader wants. */
+async function write_pages() {
+  const template = await readFile(join(here, 'index.html'), 'utf8');
+  const files = (await readdir(join(here, '../words'))).filter((f) => f.endsWith('.json'));
+  const all = {};
+  for (const file of ['en.json', ...files.filter((f) => f !== 'en.json').sort()])
+    all[file.slice(0, -5)] = JSON.parse(await readFile(join(here, '../words', file), 'utf8'));
+  for (const tag of Object.keys(all))
+    await writeFile(
+      join(dist, tag === 'en' ? 'index.html' : `index.${tag}.html`),
+      in_language(template, tag, all),
+    );
+}
+
 await rm(dist, { recursive: true, force: true });
 await mkdir(join(dist, 'assets'), { recursive: true });
 await write_licences([
@@ -89,7 +138,7 @@ await write_licences([
   await bundle('src/view3d/scene.ts', 'assets/view3d.js'),
 ]);
 await cp(join(here, 'public/icon.svg'), join(dist, 'assets/icon.svg'));
-await writeFile(join(dist, 'index.html'), await readFile(join(here, 'index.html')));
+await write_pages();
 
 const bytes = await first_page_bytes();
 console.log(

@@ -2,6 +2,7 @@
 /* ischia export: the model of a case for other programs. */
 #include "server/cli/options.h"
 #include "server/cli/run.h"
+#include "server/cli/section_words.h"
 
 static enum ischia_code write_inp(FILE *out, const struct ischia_case *c,
                                   const struct ischia_field *field, struct ischia_error *err)
@@ -17,7 +18,7 @@ static const struct {
 } formats[FORMAT_COUNT] = {
     [FORMAT_INP] = {write_inp, false},
     [FORMAT_VTU] = {ischia_write_vtu, true},
-    [FORMAT_SVG] = {ischia_write_section_svg, true},
+    [FORMAT_SVG] = {section_write_english, true},
 };
 
 static int export_case(enum format format, const char *path, const struct ischia_case *c)

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "api/case_words.h"
 #include "api/problem_doc.h"
 #include "server/cli/bar.h"
 #include "server/cli/files.h"
@@ -33,7 +34,7 @@ static void print_faults(const char *command, const char *path, const struct doc
 static void print_warnings(const char *command, const char *path, const struct ischia_case *c)
 {
     struct ischia_fault warnings[ISCHIA_PARAM_COUNT];
-    const size_t count = ischia_case_warnings(c, warnings);
+    const size_t count = case_warnings(c, LANGUAGE_EN, warnings);
     for (size_t i = 0; i < count; i++)
         (void)fprintf(stderr, "ischia %s: %s: warning: %s\n", command, path, warnings[i].detail);
 }

@@ -7,6 +7,7 @@
 #include "api/result_doc.h"
 #include "server/cli/options.h"
 #include "server/cli/run.h"
+#include "server/cli/section_words.h"
 #include "server/cli/summary.h"
 
 struct solve_options {
@@ -42,8 +43,7 @@ static enum ischia_code write_fields(const struct solve_options *options,
                                      struct ischia_error *err)
 {
     if (options->vtu != NULL) TRY(write_file(options->vtu, ischia_write_vtu, c, field, err));
-    if (options->svg != NULL)
-        TRY(write_file(options->svg, ischia_write_section_svg, c, field, err));
+    if (options->svg != NULL) TRY(write_file(options->svg, section_write_english, c, field, err));
     return ISCHIA_OK;
 }
 

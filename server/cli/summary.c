@@ -64,11 +64,11 @@ static void print_seat(FILE *out, const struct ischia_seat *seat)
 static void print_risk(FILE *out, const struct ischia_case *c, const struct ischia_result *r)
 {
     struct risk risk;
-    risk_assess(&risk, c, r);
+    risk_assess(&risk, c, r, LANGUAGE_EN);
     (void)fprintf(out, "Risk band   %s: %s\n", risk_bands[risk.band].name,
-                  risk_bands[risk.band].headline);
-    for (int i = 0; i < RISK_CAVEAT_COUNT; i++)
-        (void)fprintf(out, "%-11s %s\n", i == 0 ? "Note" : "", risk_caveats[i]);
+                  risk_headline(risk.band));
+    for (size_t i = 0; i < RISK_CAVEAT_COUNT; i++)
+        (void)fprintf(out, "%-11s %s\n", i == 0 ? "Note" : "", risk_caveat(i));
 }
 
 static void print_numerics(FILE *out, const struct ischia_case *c, const struct ischia_numerics *n)

@@ -14,6 +14,7 @@
 #include "server/cli/field_blob.h"
 #include "server/cli/options.h"
 #include "server/cli/run.h"
+#include "server/cli/section_words.h"
 #include "server/cli/version.h"
 #include "server/cli/worker_sandbox.h"
 #include "server/frame.h"
@@ -194,12 +195,24 @@ static enum ischia_code solve(struct worker *worker, const struct ischia_case *c
 
 /* ------------------------------------------------------------------------------- drawing */
 
+typedef enum ischia_code drawing_writer(FILE *out, const struct ischia_case *c,
+                                        const struct ischia_field *field, enum language language,
+                                        struct ischia_error *err);
+
+static enum ischia_code write_vtu(FILE *out, const struct ischia_case *c,
+                                  const struct ischia_field *field, enum language language,
+                                  struct ischia_error *err)
+{
+    (void)language; /* for programs */
+    return ischia_write_vtu(out, c, field, err);
+}
+
 static const struct {
     const char *as;
-    field_writer *writer;
-} drawings[] = {{"vtu", ischia_write_vtu}, {"svg", ischia_write_section_svg}};
+    drawing_writer *writer;
+} drawings[] = {{"vtu", write_vtu}, {"svg", section_write}};
 
-static field_writer *find_writer(const char *as)
+static drawing_writer *find_writer(const char *as)
 {
     for (size_t i = 0; i < sizeof drawings / sizeof drawings[0]; i++)
         if (strcmp(drawings[i].as, as) == 0) return drawings[i].writer;
@@ -207,15 +220,15 @@ static field_writer *find_writer(const char *as)
 }
 
 /* Draws into memory: a worker has no files. *ret_text is the caller's to free. */
-static enum ischia_code draw(field_writer *writer, const struct ischia_case *c,
-                             const struct ischia_field *field, char **ret_text, size_t *ret_size,
-                             struct ischia_error *err)
+static enum ischia_code draw(drawing_writer *writer, enum language language,
+                             const struct ischia_case *c, const struct ischia_field *field,
+                             char **ret_text, size_t *ret_size, struct ischia_error *err)
 {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     CHECK(out != NULL, err, ISCHIA_E_MEMORY, "no memory for a drawing");
-    enum ischia_code code = writer(out, c, field, err);
+    enum ischia_code code = writer(out, c, field, language, err);
     if (fclose(out) != 0 && code == ISCHIA_OK)
         code = FAIL(err, ISCHIA_E_MEMORY, "no memory for a drawing");
     if (code != ISCHIA_OK) {
@@ -227,28 +240,32 @@ static enum ischia_code draw(field_writer *writer, const struct ischia_case *c,
     return ISCHIA_OK;
 }
 
-static enum ischia_code draw_blob(const char *as, const struct ischia_case *c,
+static enum ischia_code draw_blob(const struct message *order, const struct ischia_case *c,
                                   const struct frame *blob, char **ret_text, size_t *ret_size,
                                   struct ischia_error *err)
 {
-    field_writer *writer = find_writer(as);
+    drawing_writer *writer = find_writer(order->as);
+    enum language language;
     struct ischia_field field = {0};
-    CHECK(writer != NULL, err, ISCHIA_E_INPUT, "no drawing of the kind %s", as);
+    CHECK(writer != NULL, err, ISCHIA_E_INPUT, "no drawing of the kind %s", order->as);
+    CHECK(words_language(order->language, &language), err, ISCHIA_E_INPUT,
+          "no words of the language %s", order->language);
     TRY(field_blob_decode((const unsigned char *)blob->bytes, blob->size, &field.displacement_mm,
                           &field.node_count, err));
-    const enum ischia_code code = draw(writer, c, &field, ret_text, ret_size, err);
+    const enum ischia_code code = draw(writer, language, c, &field, ret_text, ret_size, err);
     free(field.displacement_mm);
     return code;
 }
 
-static enum ischia_code render(struct worker *worker, const char *as, const struct ischia_case *c,
-                               const struct frame *blob, struct ischia_error *err)
+static enum ischia_code render(struct worker *worker, const struct message *order,
+                               const struct ischia_case *c, const struct frame *blob,
+                               struct ischia_error *err)
 {
     const struct message message = {.kind = MESSAGE_RENDERED, .job = worker->job};
     struct ischia_error why = {0};
     char *text = NULL;
     size_t size = 0;
-    if (draw_blob(as, c, blob, &text, &size, &why) != ISCHIA_OK)
+    if (draw_blob(order, c, blob, &text, &size, &why) != ISCHIA_OK)
         return say_error(worker, &why, err);
     enum ischia_code code = put(worker, &message, err);
     if (code == ISCHIA_OK) code = frame_put_blob(&worker->writer, text, size, err);
@@ -275,7 +292,7 @@ static enum ischia_code do_order(struct worker *worker, const struct message *or
         return say_problem(worker, &problem, err);
     }
     worker->said_at_ms = 0;
-    if (order->kind == MESSAGE_RENDER) return render(worker, order->as, &request.values, blob, err);
+    if (order->kind == MESSAGE_RENDER) return render(worker, order, &request.values, blob, err);
     return solve(worker, &request.values, err);
 }
 

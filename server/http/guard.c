@@ -84,18 +84,17 @@ static bool within_rate(struct call *call, struct http_response *ret)
     if (wait_s == 0) return true;
     metrics_count(METRIC_REFUSED_RATE);
     http_header(ret, "Retry-After", "%d", wait_s);
-    reply_refusal(call->request, ret, PROBLEM_RATE,
-                  "This client sends more than %d requests a second; wait %d s.", limit, wait_s);
+    reply_refusal(call->request, ret, PROBLEM_RATE, WORD_DAEMON_REFUSAL_RATE,
+                  WORDS(word_count("limit", limit), word_count("wait", wait_s)));
     return false;
 }
 
 static bool refuse_unknown(struct call *call, enum auth_verdict verdict, struct http_response *ret)
 {
-    static const char *const details[] = {
-        [AUTH_GRANTED] = "",
-        [AUTH_NO_TOKEN] = "Send a token: `Authorization: Bearer TOKEN`.",
-        [AUTH_BAD_TOKEN] = "This token is not known, or was revoked.",
-        [AUTH_EXPIRED] = "This token has expired.",
+    static const enum word details[] = {
+        [AUTH_NO_TOKEN] = WORD_DAEMON_REFUSAL_NO_TOKEN,
+        [AUTH_BAD_TOKEN] = WORD_DAEMON_REFUSAL_BAD_TOKEN,
+        [AUTH_EXPIRED] = WORD_DAEMON_REFUSAL_EXPIRED_TOKEN,
     };
     metrics_count(METRIC_REFUSED_AUTH);
     /* Refused without a token: that is how a browser learns to ask for one; not worth a record. */
@@ -103,7 +102,7 @@ static bool refuse_unknown(struct call *call, enum auth_verdict verdict, struct 
         (void)audit_change(call->service->audit, "-", "access", call->id_text, "401");
     http_header_static(ret, "WWW-Authenticate",
                        "Bearer realm=\"ischia\", Basic realm=\"ischia\", charset=\"UTF-8\"");
-    reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED, "%s", details[verdict]);
+    reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED, details[verdict], NULL);
     return false;
 }
 
@@ -141,7 +140,7 @@ static bool authorize_issuer(struct call *call, struct http_response *ret)
     metrics_count(METRIC_REFUSED_AUTH);
     (void)audit_change(call->service->audit, "-", "access", "", "401");
     http_header_static(ret, "WWW-Authenticate", "Bearer realm=\"ischia\"");
-    reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED, "%s", why);
+    reply_refusal_english(call->request, ret, PROBLEM_UNAUTHORIZED, "%s", why);
     return false;
 }
 
@@ -161,8 +160,8 @@ static bool authorize(struct call *call, struct http_response *ret)
     if ((call->who.scopes & needed) == needed) return true;
     metrics_count(METRIC_REFUSED_AUTH);
     (void)audit_change(call->service->audit, call->who.id, "access", call->id_text, "403");
-    reply_refusal(call->request, ret, PROBLEM_FORBIDDEN, "This needs a token with the scope '%s'.",
-                  scope_name(needed));
+    reply_refusal(call->request, ret, PROBLEM_FORBIDDEN, WORD_DAEMON_REFUSAL_SCOPE,
+                  WORDS(word_text("scope", scope_name(needed))));
     return false;
 }
 
@@ -172,16 +171,12 @@ bool guard_admit(struct call *call, struct http_response *ret)
     find_client(call);
     if (!host_is_ours(call)) {
         metrics_count(METRIC_REFUSED_ORIGIN);
-        reply_refusal(call->request, ret, PROBLEM_FORBIDDEN,
-                      "The Host of this request is not a name of this service; the option "
-                      "allowed_hosts lists its names.");
+        reply_refusal(call->request, ret, PROBLEM_FORBIDDEN, WORD_DAEMON_REFUSAL_HOST, NULL);
         return false;
     }
     if (!origin_is_fine(call)) {
         metrics_count(METRIC_REFUSED_ORIGIN);
-        reply_refusal(call->request, ret, PROBLEM_FORBIDDEN,
-                      "A page of another origin may not change anything here; the option "
-                      "allowed_origins lists those that may.");
+        reply_refusal(call->request, ret, PROBLEM_FORBIDDEN, WORD_DAEMON_REFUSAL_ORIGIN, NULL);
         return false;
     }
     return authorize(call, ret);

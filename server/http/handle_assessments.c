@@ -160,6 +160,7 @@ static bool read_request(struct call *call, struct ischia_request *request,
     struct ischia_error err;
     const struct http_request *http = call->request;
     doc_faults_init(&faults);
+    faults.language = reply_language(http);
     ischia_request_init(request);
     const enum ischia_code code = is_form(call)
                                       ? case_doc_read_form(request, http->body, http->body_size,
@@ -195,7 +196,8 @@ static void send_accepted(struct call *call, const struct store_assessment *row,
     const bool finished = queue_is_final(row->state);
     if (is_form(call)) {
         ret->status = 303;
-        http_header(ret, "Location", "/v1/assessments/%s/report", call->id_text);
+        http_header(ret, "Location", "/v1/assessments/%s/report%s", call->id_text,
+                    call->lang_query);
         return;
     }
     http_header(ret, "Location", "/v1/assessments/%s", call->id_text);
@@ -234,10 +236,11 @@ void handle_cancel(struct call *call, struct http_response *ret)
         reply_no_assessment(call, ret);
     else if (is_form(call)) { /* the plain report's button: the report says how it ended */
         ret->status = 303;
-        http_header(ret, "Location", "/v1/assessments/%s/report", call->id_text);
+        http_header(ret, "Location", "/v1/assessments/%s/report%s", call->id_text,
+                    call->lang_query);
     } else if (answer == STORE_CONFLICT && was != QUEUE_CANCELLED)
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This assessment has ended: %s.",
-                      queue_state_names[was]);
+        reply_refusal(call->request, ret, PROBLEM_CONFLICT, WORD_DAEMON_REFUSAL_ENDED,
+                      WORDS(word_text("status", reply_state(reply_language(call->request), was))));
     else
         read_and_render(call, 0, ret); /* cancelling twice is no fault */
 }
@@ -255,8 +258,7 @@ void handle_erase(struct call *call, struct http_response *ret)
         return;
     }
     if (answer == STORE_CONFLICT) {
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT,
-                      "This assessment is being solved; cancel it first.");
+        reply_refusal(call->request, ret, PROBLEM_CONFLICT, WORD_DAEMON_REFUSAL_RUNNING, NULL);
         return;
     }
     documents_forget(call->service->documents, &call->id);

@@ -131,8 +131,9 @@ void handle_cds_hook(struct call *call, struct http_response *ret)
     else if (request.has_observations)
         send_cards(call, &request, ret);
     else
-        reply_refusal(call->request, ret, PROBLEM_PRECONDITION,
-                      "The prefetch 'observations' is missing; this service asks no other server.");
+        reply_refusal_english(
+            call->request, ret, PROBLEM_PRECONDITION,
+            "The prefetch 'observations' is missing; this service asks no other server.");
 }
 
 /* ---------------------------------------------------------------------------- feedback */
@@ -154,7 +155,8 @@ static bool find_cards(struct call *call, struct store_feedback *rows,
             return false;
         }
         if (answer == STORE_DONE) continue;
-        reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, "There is no card with this uuid.");
+        reply_refusal_english(call->request, ret, PROBLEM_NOT_FOUND,
+                              "There is no card with this uuid.");
         return false;
     }
     return true;

@@ -33,7 +33,7 @@ static void put_problem(struct text_out *out, const struct problem_info *info)
     page_put(out, "\"><th scope=\"row\">");
     page_format(out, "%d", info->status);
     page_put(out, "</th><td>");
-    page_escape(out, info->title);
+    page_escape(out, words_get(LANGUAGE_EN, info->title));
     page_put(out, "</td><td><code>");
     page_escape(out, info->type);
     page_put(out, "</code></td></tr>\n");
@@ -42,8 +42,8 @@ static void put_problem(struct text_out *out, const struct problem_info *info)
 void handle_docs(struct call *call, struct http_response *ret)
 {
     struct text_out out;
-    page_begin(&out, "Ischia: the service");
-    page_put(&out, "<h1>The Ischia service</h1>\n<p>The whole contract, for programs: "
+    page_begin(&out, LANGUAGE_EN, "Ischia: the service");
+    page_put(&out, "<main>\n<h1>The Ischia service</h1>\n<p>The whole contract, for programs: "
                    "<a href=\"/openapi.json\">openapi.json</a> (OpenAPI 3.1).</p>\n"
                    "<h2>Routes</h2>\n<table>\n<thead><tr><th>route</th><th>token's scope</th>"
                    "<th>does</th></tr></thead>\n<tbody id=\"routes\">\n");

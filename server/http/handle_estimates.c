@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "api/case_doc.h"
+#include "api/case_words.h"
 #include "api/json.h"
 #include "api/problem_doc.h"
 #include "server/http/reply.h"
@@ -108,10 +109,10 @@ static void warn_of_input(struct json_out *out, const struct predictor *p,
 }
 
 static void write_warnings(struct json_out *out, const struct predictor *p,
-                           const struct ischia_case *c)
+                           const struct ischia_case *c, enum language language)
 {
     struct ischia_fault outside[ISCHIA_PARAM_COUNT];
-    const size_t count = ischia_case_warnings(c, outside);
+    const size_t count = case_warnings(c, language, outside);
     json_open_array(out, "warnings");
     for (size_t i = 0; i < count; i++)
         write_warning(out, outside[i].code, outside[i].pointer, outside[i].detail);
@@ -164,7 +165,7 @@ static void send_estimate(struct call *call, const struct ischia_case *c, struct
     json_close_object(&out);
     write_values(&out, p, known ? &point : NULL, c->param[ISCHIA_F]);
     write_emulator(&out, estimator);
-    write_warnings(&out, p, c);
+    write_warnings(&out, p, c, reply_language(call->request));
     json_close_object(&out);
     http_header_static(ret, "Cache-Control", "no-store");
     if (json_out_take(&out, &text, &size, &err) == ISCHIA_OK)
@@ -181,12 +182,14 @@ void handle_estimate(struct call *call, struct http_response *ret)
     struct ischia_error err;
     const struct http_request *http = call->request;
     if (call->service->estimator == NULL) {
-        reply_refusal(http, ret, PROBLEM_NOT_FOUND,
-                      "No trained emulator is installed here (option emulator), so there are no "
-                      "estimates; an assessment is always solved.");
+        reply_refusal_english(
+            http, ret, PROBLEM_NOT_FOUND,
+            "No trained emulator is installed here (option emulator), so there are no "
+            "estimates; an assessment is always solved.");
         return;
     }
     doc_faults_init(&faults);
+    faults.language = reply_language(http);
     const enum ischia_code code =
         case_doc_read(&request, http->body, http->body_size, &json_limits_request, &faults, &err);
     if (code == ISCHIA_OK && faults.count == 0) {

@@ -130,8 +130,8 @@ static void send_definition(struct call *call, enum fhir_type type, struct http_
         return;
     }
     json_out_finish(&out);
-    reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, "There is no such %s.",
-                  fhir_type_names[type]);
+    reply_refusal_english(call->request, ret, PROBLEM_NOT_FOUND, "There is no such %s.",
+                          fhir_type_names[type]);
 }
 
 /* Which assessment the id in the path means, and which of its numbers. */
@@ -186,8 +186,8 @@ static void send_resource(struct call *call, enum fhir_type type, int measure,
         put_version(row, ret);
         if (!reply_not_modified(call->request, ret)) fhir_send(call, 200, &out, ret);
     } else {
-        reply_refusal(call->request, ret, PROBLEM_NOT_FOUND,
-                      "This assessment has no such number (yet).");
+        reply_refusal_english(call->request, ret, PROBLEM_NOT_FOUND,
+                              "This assessment has no such number (yet).");
     }
     json_out_finish(&out);
     free(html);
@@ -500,7 +500,7 @@ static void send_page(struct call *call, const struct search *s, struct http_res
     if (code == ISCHIA_OK)
         fhir_send(call, 200, &page.out, ret);
     else if (code == ISCHIA_E_INPUT && s->cursor[0] != '\0')
-        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, "%s", page.err.message);
+        reply_refusal_english(call->request, ret, PROBLEM_BAD_REQUEST, "%s", page.err.message);
     else
         reply_failure(call->request, ret, &page.err);
     json_out_finish(&page.out);

@@ -190,8 +190,8 @@ void handle_fhir_cancel(struct call *call, struct http_response *ret)
     else if (answer == STORE_NOT_FOUND)
         reply_no_assessment(call, ret);
     else if (answer == STORE_CONFLICT && was != QUEUE_CANCELLED)
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This assessment has ended: %s.",
-                      queue_state_names[was]);
+        reply_refusal_english(call->request, ret, PROBLEM_CONFLICT,
+                              "This assessment has ended: %s.", queue_state_names[was]);
     else
         ret->status = 202;
 }

@@ -11,7 +11,14 @@
 struct drawing {
     enum pool_render_kind kind;
     const char *type, *suffix;
+    bool has_words;
 };
+
+/* A file without words is one file, whoever asks. */
+static enum language drawing_language(const struct call *call, const struct drawing *drawing)
+{
+    return drawing->has_words ? reply_language(call->request) : LANGUAGE_EN;
+}
 
 static void on_drawn(void *context, enum ischia_code code, const unsigned char *bytes, size_t size,
                      const struct ischia_error *err)
@@ -34,12 +41,13 @@ static void on_drawn(void *context, enum ischia_code code, const unsigned char *
 static void refuse_unfinished(struct call *call, enum queue_state state, struct http_response *ret)
 {
     if (queue_is_final(state))
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT,
-                      "This assessment has no field: it ended as %s.", queue_state_names[state]);
+        reply_refusal(
+            call->request, ret, PROBLEM_CONFLICT, WORD_DAEMON_REFUSAL_NO_FIELD,
+            WORDS(word_text("status", reply_state(reply_language(call->request), state))));
     else
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT,
-                      "This assessment is %s; its field exists when it has succeeded.",
-                      queue_state_names[state]);
+        reply_refusal(
+            call->request, ret, PROBLEM_CONFLICT, WORD_DAEMON_REFUSAL_FIELD_LATER,
+            WORDS(word_text("status", reply_state(reply_language(call->request), state))));
 }
 
 static void reply_render_failure(struct call *call, const struct ischia_error *err,
@@ -50,7 +58,7 @@ static void reply_render_failure(struct call *call, const struct ischia_error *e
         return;
     }
     http_header_static(ret, "Retry-After", "5");
-    reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE, "Too many drawings are under way.");
+    reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE, WORD_DAEMON_REFUSAL_DRAWINGS, NULL);
 }
 
 /* Gives the render worker its work; `row` is the assessment. */
@@ -71,7 +79,8 @@ static void ask_for_drawing(struct call *call, const struct store_assessment *ro
     if (code == ISCHIA_OK && deferred == NULL)
         code = FAIL(&err, ISCHIA_E_MEMORY, "no memory for a drawing");
     if (code == ISCHIA_OK) {
-        code = pool_render(queue_pool(call->service->queue), drawing->kind, row->case_json, field,
+        code = pool_render(queue_pool(call->service->queue), drawing->kind,
+                           language_tags[drawing_language(call, drawing)], row->case_json, field,
                            size, on_drawn, deferred, &err);
         if (code != ISCHIA_OK) { /* the callback will not come: give up its share */
             http_release(deferred->exchange);
@@ -91,8 +100,9 @@ static void put_tag(const struct call *call, const struct drawing *drawing,
                     struct http_response *ret)
 {
     /* A finished field never changes, but a newer program may draw it otherwise. */
-    (void)snprintf(ret->etag, sizeof ret->etag, "\"%s-%s-%s\"", call->id_text, drawing->suffix,
-                   ISCHIA_VERSION);
+    (void)snprintf(ret->etag, sizeof ret->etag, "\"%s-%s-%s-%s\"", call->id_text, drawing->suffix,
+                   language_tags[drawing_language(call, drawing)], ISCHIA_VERSION);
+    if (drawing->has_words) reply_put_language(call->request, ret);
     http_header_static(ret, "Cache-Control", "no-cache, private");
 }
 
@@ -143,7 +153,8 @@ static void draw(struct call *call, const struct drawing *drawing, struct http_r
     } else if (atomic_load(&call->deferred->done)) {
         finish_drawing(call, drawing, ret);
     } else if (http_is_stopping(call->service->http)) {
-        reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE, "The service is shutting down.");
+        reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE, WORD_DAEMON_REFUSAL_SHUTTING_DOWN,
+                      NULL);
     } else {
         ret->action = HTTP_WAIT;
         ret->wake_at_ms = INT64_MAX / 4;
@@ -152,12 +163,12 @@ static void draw(struct call *call, const struct drawing *drawing, struct http_r
 
 void handle_field(struct call *call, struct http_response *ret)
 {
-    static const struct drawing vtu = {POOL_RENDER_VTU, "application/vnd.vtk.vtu", "vtu"};
+    static const struct drawing vtu = {POOL_RENDER_VTU, "application/vnd.vtk.vtu", "vtu", false};
     draw(call, &vtu, ret);
 }
 
 void handle_section(struct call *call, struct http_response *ret)
 {
-    static const struct drawing svg = {POOL_RENDER_SVG, "image/svg+xml", "svg"};
+    static const struct drawing svg = {POOL_RENDER_SVG, "image/svg+xml", "svg", true};
     draw(call, &svg, ret);
 }

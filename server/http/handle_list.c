@@ -28,8 +28,8 @@ static void find_text(struct call *call, struct list_query *q, const char *key, 
                       size_t size)
 {
     if (query_find(call->request->query, key, ret, size) == QUERY_BAD)
-        doc_faults_add(&q->faults, key, "malformed", "%s is given twice, too long or malformed",
-                       key);
+        doc_faults_say(&q->faults, key, "malformed", WORD_DAEMON_REFUSAL_QUERY_TEXT,
+                       WORDS(word_text("key", key)));
 }
 
 static void read_side(struct list_query *q)
@@ -37,7 +37,7 @@ static void read_side(struct list_query *q)
     if (q->side[0] == '\0') return;
     q->filter.side = q->side;
     if (strcmp(q->side, "left") != 0 && strcmp(q->side, "right") != 0)
-        doc_faults_add(&q->faults, "side", "not_allowed", "side is left or right");
+        doc_faults_say(&q->faults, "side", "not_allowed", WORD_DAEMON_REFUSAL_QUERY_SIDE, NULL);
 }
 
 static void read_status(struct list_query *q)
@@ -45,16 +45,15 @@ static void read_status(struct list_query *q)
     if (q->status[0] == '\0') return;
     q->filter.by_state = true;
     if (!queue_state_from_name(q->status, &q->filter.state))
-        doc_faults_add(&q->faults, "status", "not_allowed",
-                       "status is queued, running, succeeded, failed or cancelled");
+        doc_faults_say(&q->faults, "status", "not_allowed", WORD_DAEMON_REFUSAL_QUERY_STATUS, NULL);
 }
 
 static void read_limit(struct list_query *q)
 {
     long long limit = LIMIT_USUAL;
     if (q->limit[0] != '\0' && !query_whole_number(q->limit, 1, STORE_LIST_LIMIT_MAX, &limit))
-        doc_faults_add(&q->faults, "limit", "out_of_range", "limit is 1 to %d",
-                       STORE_LIST_LIMIT_MAX);
+        doc_faults_say(&q->faults, "limit", "out_of_range", WORD_DAEMON_REFUSAL_QUERY_LIMIT,
+                       WORDS(word_count("max", STORE_LIST_LIMIT_MAX)));
     q->filter.limit = (int)limit;
 }
 
@@ -63,8 +62,7 @@ static void read_subject(struct list_query *q)
     if (q->subject[0] == '\0') return;
     q->filter.subject = q->subject;
     if (!text_is_pseudonym(q->subject))
-        doc_faults_add(&q->faults, "subject", "malformed",
-                       "subject is 1 to 64 letters, digits, dots, hyphens and underscores");
+        doc_faults_say(&q->faults, "subject", "malformed", WORD_DAEMON_REFUSAL_QUERY_SUBJECT, NULL);
 }
 
 static bool read_list_query(struct call *call, struct list_query *q, struct http_response *ret)
@@ -72,6 +70,7 @@ static bool read_list_query(struct call *call, struct list_query *q, struct http
     struct problem problem;
     memset(&q->filter, 0, sizeof q->filter);
     doc_faults_init(&q->faults);
+    q->faults.language = reply_language(call->request);
     find_text(call, q, "subject", q->subject, sizeof q->subject);
     find_text(call, q, "side", q->side, sizeof q->side);
     find_text(call, q, "status", q->status, sizeof q->status);
@@ -84,7 +83,7 @@ static bool read_list_query(struct call *call, struct list_query *q, struct http
     q->filter.cursor = q->cursor[0] == '\0' ? NULL : q->cursor;
     q->filter.with_results = true;
     if (q->faults.count == 0) return true;
-    problem_init(&problem, PROBLEM_BAD_REQUEST, "The query is not acceptable.");
+    problem_say(&problem, PROBLEM_BAD_REQUEST, q->faults.language, WORD_DAEMON_REFUSAL_QUERY, NULL);
     problem.faults = q->faults;
     reply_problem(call->request, &problem, ret);
     return false;
@@ -149,7 +148,8 @@ static void send_json(struct call *call, const struct list_query *q, struct http
         put_next(q, cursor, ret);
         http_body(ret, "application/json", text, size);
     } else if (code == ISCHIA_E_INPUT && q->filter.cursor != NULL) {
-        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, "%s", page.err.message);
+        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_QUERY_CURSOR,
+                      NULL);
     } else {
         reply_failure(call->request, ret, &page.err);
     }
@@ -239,7 +239,8 @@ static void send_csv(struct call *call, const struct list_query *q, struct http_
     } else {
         text_out_finish(&page.out);
         if (code == ISCHIA_E_INPUT && q->filter.cursor != NULL)
-            reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, "%s", page.err.message);
+            reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_QUERY_CURSOR,
+                          NULL);
         else
             reply_failure(call->request, ret, &page.err);
     }
@@ -287,9 +288,8 @@ static bool read_changes_query(struct call *call, long long *ret_since, long lon
         (s == QUERY_ABSENT || query_whole_number(since, 0, INT64_MAX, ret_since)) &&
         (l == QUERY_ABSENT || query_whole_number(limit, 1, STORE_LIST_LIMIT_MAX, ret_limit));
     if (!good)
-        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
-                      "since is a number from an earlier answer, limit is 1 to %d.",
-                      STORE_LIST_LIMIT_MAX);
+        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_QUERY_SINCE,
+                      WORDS(word_count("max", STORE_LIST_LIMIT_MAX)));
     return good;
 }
 

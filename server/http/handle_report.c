@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "api/case_doc.h"
+#include "api/case_words.h"
 #include "api/problem_doc.h"
 #include "api/result_doc.h"
 #include "api/risk.h"
@@ -23,348 +23,441 @@
 
 enum { WAIT_MAX_S = 60 };
 
+/* One report on its way out. */
+struct report {
+    struct text_out *out;
+    enum language language;
+    const struct store_assessment *row;
+    const char *lang_query; /* "?lang=fr" when the address asked for it, else ""            */
+    bool attached;          /* travels alone: refers to nothing of this service              */
+};
+
+static const char *say(const struct report *r, enum word word)
+{
+    return words_get(r->language, word);
+}
+
 /* ---------------------------------------------------------------------------- tables */
 
-static void put_cell(struct text_out *out, const char *markup, const char *text)
+static void put_cell(const struct report *r, const char *markup, const char *text)
 {
-    page_put(out, markup);
-    page_escape(out, text);
-    page_put(out, "</td>");
+    page_put(r->out, markup);
+    page_escape(r->out, text);
+    page_put(r->out, "</td>");
 }
 
-__attribute__((format(printf, 2, 3))) static void put_number(struct text_out *out,
-                                                             const char *format, ...)
+static void put_text(const struct report *r, const char *text) { put_cell(r, "<td>", text); }
+
+static void put_number(const struct report *r, const char *text)
 {
-    char value[128];
-    va_list arguments;
-    va_start(arguments, format);
-    (void)vsnprintf(value, sizeof value, format, arguments);
-    va_end(arguments);
-    put_cell(out, "<td class=\"n\">", value);
+    put_cell(r, "<td class=\"n\">", text);
 }
 
-static void begin_table(struct text_out *out, const char *caption)
+static void put_fixed(const struct report *r, double number, int decimals)
 {
-    page_put(out, "<table>\n<caption>");
-    page_escape(out, caption);
-    page_put(out, "</caption>\n");
+    char value[WORDS_NUMBER_BYTES];
+    put_number(r, words_fixed(value, r->language, number, decimals));
 }
 
-static void begin_row(struct text_out *out, const char *name)
+/* A cell with a sentence of numbers. */
+static void put_filled(const struct report *r, const char *markup, enum word word,
+                       const struct word_value *values)
 {
-    page_put(out, "<tr><th scope=\"row\">");
-    page_escape(out, name);
-    page_put(out, "</th>");
+    char text[160];
+    put_cell(r, markup, words_fill(text, sizeof text, r->language, word, values));
 }
 
-static void put_column(struct text_out *out, const char *name)
+static void begin_table(const struct report *r, enum word caption)
 {
-    page_put(out, "<th scope=\"col\" class=\"n\">");
-    page_escape(out, name);
-    page_put(out, "</th>");
+    page_put(r->out, "<table>\n<caption>");
+    page_word(r->out, r->language, caption);
+    page_put(r->out, "</caption>\n");
 }
 
-static void put_inputs(struct text_out *out, const struct ischia_request *request)
+static void begin_row(const struct report *r, const char *name)
 {
-    begin_table(out, "Inputs");
+    page_put(r->out, "<tr><th scope=\"row\">");
+    page_escape(r->out, name);
+    page_put(r->out, "</th>");
+}
+
+static void end_row(const struct report *r) { page_put(r->out, "</tr>\n"); }
+
+static void end_table(const struct report *r) { page_put(r->out, "</table>\n"); }
+
+static void put_inputs(const struct report *r, const struct ischia_request *request)
+{
+    char value[WORDS_NUMBER_BYTES];
+    begin_table(r, WORD_REPORT_INPUTS);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
-        begin_row(out, ischia_params[i].name);
-        put_cell(out, "<td>", ischia_params[i].key);
-        put_number(out, "%g", request->values.param[i]);
-        put_cell(out, "<td>", ischia_params[i].unit);
-        page_put(out, "</tr>\n");
+        begin_row(r, say(r, param_words[i].name));
+        put_text(r, ischia_params[i].key);
+        put_number(r, words_number(value, r->language, request->values.param[i], 6));
+        put_text(r, ischia_params[i].unit);
+        end_row(r);
     }
-    page_put(out, "</table>\n");
+    end_table(r);
 }
 
-static void put_strains(struct text_out *out, const struct ischia_result *r)
+static void put_eps_max(const struct report *r, const struct ischia_result *result)
 {
-    char above[32], depth[48];
-    (void)snprintf(depth, sizeof depth, "axis, %.1f mm below the bone", r->strain.eps_max_depth_mm);
-    begin_table(out, "Strain in the muscle");
-    begin_row(out, "eps_max");
-    put_cell(out, "<td>", "engineering");
-    put_number(out, "%.3f \u00b1 %.3f", r->strain.eps_max, r->numerics.eps_max_error);
-    put_cell(out, "<td>", depth);
-    page_put(out, "</tr>\n");
+    char value[WORDS_NUMBER_BYTES], error[WORDS_NUMBER_BYTES], both[2 * WORDS_NUMBER_BYTES + 8];
+    (void)words_fixed(value, r->language, result->strain.eps_max, 3);
+    (void)words_fixed(error, r->language, result->numerics.eps_max_error, 3);
+    (void)snprintf(both, sizeof both, "%s \u00b1 %s", value, error);
+    begin_row(r, say(r, WORD_CURVE_COL_EPS));
+    put_text(r, say(r, WORD_REPORT_ENGINEERING));
+    put_number(r, both);
+    put_filled(r, "<td>", WORD_DAEMON_REPORT_AXIS,
+               WORDS(word_fixed("depth", result->strain.eps_max_depth_mm, 1)));
+    end_row(r);
+}
+
+static void put_strains(const struct report *r, const struct ischia_result *result)
+{
     const struct {
-        const char *name, *measure;
+        enum word name;
         double value, threshold;
     } rows[] = {
-        {"E_shear", "Green\u2013Lagrange", r->strain.E_shear_max, ISCHIA_E_SHEAR_THRESHOLD},
-        {"E_comp", "Green\u2013Lagrange", r->strain.E_comp_max, ISCHIA_E_COMP_THRESHOLD},
+        {WORD_CURVE_COL_SHEAR, result->strain.E_shear_max, ISCHIA_E_SHEAR_THRESHOLD},
+        {WORD_CURVE_COL_COMP, result->strain.E_comp_max, ISCHIA_E_COMP_THRESHOLD},
     };
+    begin_table(r, WORD_REPORT_STRAIN);
+    put_eps_max(r, result);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        (void)snprintf(above, sizeof above, "largest; threshold %.2f", rows[i].threshold);
-        begin_row(out, rows[i].name);
-        put_cell(out, "<td>", rows[i].measure);
-        put_number(out, "%.3f", rows[i].value);
-        put_cell(out, "<td>", above);
-        page_put(out, "</tr>\n");
+        begin_row(r, say(r, rows[i].name));
+        put_text(r, say(r, WORD_REPORT_GREEN_LAGRANGE));
+        put_fixed(r, rows[i].value, 3);
+        put_filled(r, "<td>", WORD_DAEMON_REPORT_LARGEST,
+                   WORDS(word_fixed("threshold", rows[i].threshold, 2)));
+        end_row(r);
     }
-    page_put(out, "</table>\n");
+    end_table(r);
 }
 
-static void put_seat(struct text_out *out, const struct ischia_seat *seat)
+static void put_seat(const struct report *r, const struct ischia_seat *seat)
 {
     const struct {
-        const char *name, *unit;
-        int decimals;
         double value;
+        const char *unit;
+        enum word name;
+        int decimals;
     } rows[] = {
-        {"travel", "mm", 1, seat->displacement_mm},
-        {"contact area", "mm\u00b2", 0, seat->contact_area_mm2},
-        {"mean pressure", "kPa", 1, seat->mean_pressure_kPa},
-        {"peak pressure", "kPa", 1, seat->peak_pressure_kPa},
+        {seat->displacement_mm, "mm", WORD_DAEMON_REPORT_TRAVEL, 1},
+        {seat->contact_area_mm2, "mm\u00b2", WORD_DAEMON_REPORT_AREA, 0},
+        {seat->mean_pressure_kPa, "kPa", WORD_DAEMON_REPORT_MEAN_PRESSURE, 1},
+        {seat->peak_pressure_kPa, "kPa", WORD_DAEMON_REPORT_PEAK_PRESSURE, 1},
     };
-    begin_table(out, "Seat");
+    begin_table(r, WORD_VIEW_SEAT);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        begin_row(out, rows[i].name);
-        put_number(out, "%.*f", rows[i].decimals, rows[i].value);
-        put_cell(out, "<td>", rows[i].unit);
-        page_put(out, "</tr>\n");
+        begin_row(r, say(r, rows[i].name));
+        put_fixed(r, rows[i].value, rows[i].decimals);
+        put_text(r, rows[i].unit);
+        end_row(r);
     }
-    page_put(out, "</table>\n");
+    end_table(r);
 }
 
-static void put_largest(struct text_out *out, const struct ischia_case *c,
+static void put_largest(const struct report *r, const struct ischia_case *c,
                         const struct ischia_cluster_set *set)
 {
     const double tip_mm =
         c->option[ISCHIA_SKIN_THICKNESS] + c->param[ISCHIA_EF] + c->param[ISCHIA_EM];
     if (set->has_largest)
-        put_number(out, "%.0f mm\u00b3, %.1f mm", set->largest.volume_mm3,
-                   tip_mm - set->largest.centroid_mm[2]);
+        put_filled(r, "<td class=\"n\">", WORD_DAEMON_REPORT_WHERE,
+                   WORDS(word_fixed("volume", set->largest.volume_mm3, 0),
+                         word_fixed("depth", tip_mm - set->largest.centroid_mm[2], 1)));
     else
-        put_cell(out, "<td class=\"n\">", "none");
+        put_number(r, say(r, WORD_DAEMON_REPORT_NONE));
 }
 
-static void put_first_force(struct text_out *out, enum ischia_criterion k,
-                            const struct ischia_result *r)
+static void put_first_force(const struct report *r, enum ischia_criterion k,
+                            const struct ischia_result *result)
 {
-    const double force_N =
-        k == ISCHIA_OVER_SHEAR ? r->threshold_force_shear_N : r->threshold_force_compression_N;
-    if (k == ISCHIA_OVER_BOTH)
-        page_put(out, "<td></td>");
-    else if (isnan(force_N))
-        put_cell(out, "<td class=\"n\">", "not reached");
-    else
-        put_number(out, "%.0f N", force_N);
+    char text[WORDS_NUMBER_BYTES], cell[WORDS_NUMBER_BYTES + 8];
+    const double force_N = k == ISCHIA_OVER_SHEAR ? result->threshold_force_shear_N
+                                                  : result->threshold_force_compression_N;
+    if (k == ISCHIA_OVER_BOTH) {
+        page_put(r->out, "<td></td>");
+    } else if (isnan(force_N)) {
+        put_number(r, say(r, WORD_NUMBERS_NEVER));
+    } else {
+        (void)snprintf(cell, sizeof cell, "%s N", words_fixed(text, r->language, force_N, 0));
+        put_number(r, cell);
+    }
 }
 
-static void put_clusters(struct text_out *out, const struct ischia_case *c,
-                         const struct ischia_result *r)
+static void put_column(const struct report *r, const char *class, const char *name)
+{
+    page_put(r->out, "<th scope=\"col\"");
+    page_put(r->out, class);
+    page_put(r->out, ">");
+    page_escape(r->out, name);
+    page_put(r->out, "</th>");
+}
+
+static void put_cluster_head(const struct report *r, double F_N)
+{
+    static const enum word columns[] = {WORD_REPORT_VOLUME, WORD_REPORT_SHARE, WORD_REPORT_COUNT,
+                                        WORD_REPORT_LARGEST};
+    char first[64];
+    page_put(r->out, "<thead><tr>");
+    put_column(r, "", say(r, WORD_REPORT_CRITERION));
+    for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++)
+        put_column(r, " class=\"n\"", say(r, columns[i]));
+    put_column(r, " class=\"n\"",
+               words_fill(first, sizeof first, r->language, WORD_DAEMON_REPORT_FIRST_AT,
+                          WORDS(word_number("F", F_N, 6))));
+    page_put(r->out, "</tr></thead>\n");
+}
+
+static void put_clusters(const struct report *r, const struct ischia_case *c,
+                         const struct ischia_result *result)
 {
     static const struct {
-        const char *name;
-        double threshold; /* 0: none of its own */
+        enum word name;
+        double threshold;
     } criteria[ISCHIA_CRITERION_COUNT] = {
-        [ISCHIA_OVER_SHEAR] = {"Shear", ISCHIA_E_SHEAR_THRESHOLD},
-        [ISCHIA_OVER_COMPRESSION] = {"Compression", ISCHIA_E_COMP_THRESHOLD},
-        [ISCHIA_OVER_BOTH] = {"Both at once", 0},
+        [ISCHIA_OVER_SHEAR] = {WORD_GLANCE_SHEAR, ISCHIA_E_SHEAR_THRESHOLD},
+        [ISCHIA_OVER_COMPRESSION] = {WORD_GLANCE_COMPRESSION, ISCHIA_E_COMP_THRESHOLD},
+        [ISCHIA_OVER_BOTH] = {WORD_GLANCE_BOTH, 0},
     };
-    char first[40], name[40];
-    (void)snprintf(first, sizeof first, "First at (F = %g N)", c->param[ISCHIA_F]);
-    begin_table(out, "Muscle over the thresholds (Green\u2013Lagrange; unloaded volume, the whole "
-                     "side)");
-    page_put(out, "<thead><tr><th scope=\"col\">Criterion</th>");
-    const char *const columns[] = {"Volume, mm\u00b3", "of the muscle", "Bodies",
-                                   "Largest, under the bone", first};
-    for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++) put_column(out, columns[i]);
-    page_put(out, "</tr></thead>\n");
+    char name[64];
+    const double muscle_mm3 = result->muscle_volume_mm3;
+    begin_table(r, WORD_DAEMON_REPORT_CLUSTERS);
+    put_cluster_head(r, c->param[ISCHIA_F]);
     for (int k = 0; k < ISCHIA_CRITERION_COUNT; k++) {
-        const struct ischia_cluster_set *set = &r->clusters[k];
-        (void)snprintf(name, sizeof name, criteria[k].threshold > 0 ? "%s over %.2f" : "%s",
-                       criteria[k].name, criteria[k].threshold);
-        begin_row(out, name);
-        put_number(out, "%.0f", set->volume_mm3);
-        put_number(out, "%.1f %%",
-                   r->muscle_volume_mm3 > 0 ? 100 * set->volume_mm3 / r->muscle_volume_mm3 : 0);
-        put_number(out, "%d", set->count);
-        put_largest(out, c, set);
-        put_first_force(out, (enum ischia_criterion)k, r);
-        page_put(out, "</tr>\n");
+        const struct ischia_cluster_set *set = &result->clusters[k];
+        begin_row(r, words_fill(name, sizeof name, r->language, criteria[k].name,
+                                WORDS(word_fixed("threshold", criteria[k].threshold, 2))));
+        put_fixed(r, set->volume_mm3, 0);
+        put_filled(r, "<td class=\"n\">", WORD_DAEMON_REPORT_PERCENT,
+                   WORDS(word_fixed("percent",
+                                    muscle_mm3 > 0 ? 100 * set->volume_mm3 / muscle_mm3 : 0, 1)));
+        put_fixed(r, set->count, 0);
+        put_largest(r, c, set);
+        put_first_force(r, (enum ischia_criterion)k, result);
+        end_row(r);
     }
-    page_put(out, "</table>\n");
+    end_table(r);
 }
 
 /* ----------------------------------------------------------------------------- words */
 
-static void put_headline(struct text_out *out, const char *class, const char *text)
+static void put_headline(const struct report *r, const char *class, enum word word)
 {
-    page_put(out, "<p class=\"headline ");
-    page_escape(out, class);
-    page_put(out, "\">");
-    page_escape(out, text);
-    page_put(out, "</p>\n");
+    page_put(r->out, "<p class=\"headline ");
+    page_escape(r->out, class);
+    page_put(r->out, "\">");
+    page_word(r->out, r->language, word);
+    page_put(r->out, "</p>\n");
 }
 
-static void put_item(struct text_out *out, const char *class, const char *text)
+static void put_item(const struct report *r, const char *class, const char *text)
 {
-    page_put(out, "<li class=\"");
-    page_escape(out, class);
-    page_put(out, "\">");
-    page_escape(out, text);
-    page_put(out, "</li>\n");
+    page_put(r->out, "<li class=\"");
+    page_escape(r->out, class);
+    page_put(r->out, "\">");
+    page_escape(r->out, text);
+    page_put(r->out, "</li>\n");
 }
 
-static void put_title(struct text_out *out, const struct ischia_request *request)
+static void put_title(const struct report *r, const struct ischia_request *request)
 {
-    page_put(out, "<header>\n<h1>Tissue strain report");
+    static const enum word sides[ISCHIA_SIDE_COUNT] = {
+        [ISCHIA_SIDE_LEFT] = WORD_DAEMON_REPORT_LEFT,
+        [ISCHIA_SIDE_RIGHT] = WORD_DAEMON_REPORT_RIGHT,
+    };
+    page_put(r->out, "<header>\n<h1>");
+    page_word(r->out, r->language, WORD_REPORT_TITLE);
     if (request->side != ISCHIA_SIDE_NONE)
-        page_format(out, " \u00b7 %s side", ischia_side_names[request->side]);
-    page_put(out, "</h1>\n<p>");
-    page_format(out, "%s%s", request->subject[0] != '\0' ? "Subject " : "", request->subject);
-    if (request->label[0] != '\0') page_format(out, " \u00b7 %s", request->label);
-    if (request->measured_at[0] != '\0')
-        page_format(out, " \u00b7 measured %s", request->measured_at);
-    page_put(out, "</p>\n</header>\n");
+        page_format(r->out, " \u00b7 %s", say(r, sides[request->side]));
+    page_put(r->out, "</h1>\n<p>");
+    if (request->subject[0] != '\0')
+        page_fill(r->out, r->language, WORD_RESULT_SUBJECT,
+                  WORDS(word_text("subject", request->subject)));
+    if (request->label[0] != '\0') page_format(r->out, " \u00b7 %s", request->label);
+    if (request->measured_at[0] != '\0') {
+        page_put(r->out, " \u00b7 ");
+        page_fill(r->out, r->language, WORD_RESULT_MEASURED,
+                  WORDS(word_text("time", request->measured_at)));
+    }
+    page_put(r->out, "</p>\n</header>\n");
 }
 
-static void put_words(struct text_out *out, const struct ischia_case *c,
-                      const struct ischia_result *r)
+static void put_words(const struct report *r, const struct ischia_case *c,
+                      const struct ischia_result *result)
 {
     struct risk risk;
-    risk_assess(&risk, c, r);
-    put_headline(out, risk_bands[risk.band].name, risk_bands[risk.band].headline);
-    page_put(out, "<ul>\n");
-    for (int i = 0; i < risk.reason_count; i++) put_item(out, "reason", risk.reason[i]);
-    page_put(out, "</ul>\n");
+    risk_assess(&risk, c, result, r->language);
+    put_headline(r, risk_bands[risk.band].name, risk_bands[risk.band].headline);
+    page_put(r->out, "<ul>\n");
+    for (int i = 0; i < risk.reason_count; i++) put_item(r, "reason", risk.reason[i]);
+    page_put(r->out, "</ul>\n");
 }
 
-static void put_notes(struct text_out *out, const struct ischia_case *c)
+static void put_notes(const struct report *r, const struct ischia_case *c)
 {
     struct ischia_fault warnings[ISCHIA_PARAM_COUNT];
-    const size_t count = ischia_case_warnings(c, warnings);
-    page_put(out, "<section>\n<h2>What this does not say</h2>\n<ul>\n");
-    for (size_t i = 0; i < count; i++) put_item(out, "warning", warnings[i].detail);
-    for (int i = 0; i < RISK_CAVEAT_COUNT; i++) put_item(out, "caveat", risk_caveats[i]);
-    put_item(out, "caveat",
-             "eps_max is engineering strain, the thresholds are on "
-             "Green\u2013Lagrange strain: never compare one with the other.");
-    page_put(out, "</ul>\n</section>\n");
+    const size_t count = case_warnings(c, r->language, warnings);
+    page_put(r->out, "<section>\n<h2>");
+    page_word(r->out, r->language, WORD_CAVEAT_TITLE);
+    page_put(r->out, "</h2>\n<ul>\n");
+    for (size_t i = 0; i < count; i++) put_item(r, "warning", warnings[i].detail);
+    for (int i = 0; i < RISK_CAVEAT_COUNT; i++) put_item(r, "caveat", say(r, risk_caveats[i]));
+    put_item(r, "caveat", say(r, WORD_CAVEAT_MEASURES));
+    page_put(r->out, "</ul>\n</section>\n");
 }
 
 /* What made it, which assessment it is, when, and room for a name. */
-static void put_end(struct text_out *out, const struct store_assessment *row, bool with_signature)
+static void put_end(const struct report *r, bool with_signature)
 {
     char id[UUID_TEXT_BYTES], created[DOCUMENTS_TIME_BYTES], finished[DOCUMENTS_TIME_BYTES];
-    uuid_format(&row->id, id);
-    documents_time(row->created_ms, created);
-    documents_time(row->finished_ms, finished);
-    page_put(out, "<footer>\n<p>");
-    page_format(out, "Ischia %s \u00b7 model %s %d \u00b7 assessment %s \u00b7 created %s",
-                ISCHIA_VERSION, ISCHIA_MODEL_NAME, ISCHIA_MODEL_VERSION, id, created);
-    if (finished[0] != '\0') page_format(out, " \u00b7 ended %s", finished);
-    page_put(out, "</p>\n");
-    if (with_signature) page_put(out, "<p class=\"signature\">Name, date, signature</p>\n");
-    page_put(out, "</footer>\n");
+    uuid_format(&r->row->id, id);
+    documents_time(r->row->created_ms, created);
+    documents_time(r->row->finished_ms, finished);
+    page_put(r->out, "<footer>\n<p>");
+    page_fill(r->out, r->language, WORD_DAEMON_REPORT_MADE,
+              WORDS(word_text("version", ISCHIA_VERSION), word_text("model", ISCHIA_MODEL_NAME),
+                    word_count("model_version", ISCHIA_MODEL_VERSION), word_text("id", id),
+                    word_text("time", created)));
+    if (finished[0] != '\0') {
+        page_put(r->out, " \u00b7 ");
+        page_fill(r->out, r->language, WORD_DAEMON_REPORT_ENDED,
+                  WORDS(word_text("time", finished)));
+    }
+    page_put(r->out, "</p>\n");
+    if (with_signature) {
+        page_put(r->out, "<p class=\"signature\">");
+        page_word(r->out, r->language, WORD_REPORT_SIGNATURE);
+        page_put(r->out, "</p>\n");
+    }
+    page_put(r->out, "</footer>\n");
 }
 
 /* ---------------------------------------------------------------------------- states */
 
-static void put_figure(struct text_out *out, const struct store_assessment *row)
+/* The address of a part of this assessment, for an attribute. */
+static void put_address(const struct report *r, const char *part)
 {
     char id[UUID_TEXT_BYTES];
-    uuid_format(&row->id, id);
-    page_put(out, "<figure><figcaption>Section, loaded, coloured by Green\u2013Lagrange shear "
-                  "strain</figcaption><img alt=\"Section through the loaded tissue, coloured by "
-                  "shear strain, with the threshold's contour\" src=\"/v1/assessments/");
-    page_put(out, id);
-    page_put(out, "/section.svg\"></figure>\n");
+    uuid_format(&r->row->id, id);
+    page_format(r->out, "/v1/assessments/%s%s", id, part);
 }
 
-/* attached: the text travels alone, without the picture that this service draws. */
-static enum ischia_code put_result(struct text_out *out, const struct store_assessment *row,
-                                   const struct ischia_request *request, bool attached,
+static void put_figure(const struct report *r)
+{
+    page_put(r->out, "<figure><figcaption>");
+    page_word(r->out, r->language, WORD_REPORT_SECTION);
+    page_put(r->out, "</figcaption><img alt=\"");
+    page_word(r->out, r->language, WORD_DAEMON_REPORT_ALT);
+    page_put(r->out, "\" src=\"");
+    put_address(r, "/section.svg?lang=");
+    page_put(r->out, language_tags[r->language]);
+    page_put(r->out, "\"></figure>\n");
+}
+
+static enum ischia_code put_result(const struct report *r, const struct ischia_request *request,
                                    struct ischia_error *err)
 {
-    struct ischia_result r;
-    TRY(result_doc_read(&r, NULL, row->result_json, strlen(row->result_json), &json_limits_stored,
-                        err));
-    put_words(out, &request->values, &r);
-    page_put(out, "<div class=\"columns\">\n<div>\n");
-    put_inputs(out, request);
-    page_put(out, "</div>\n<div>\n");
-    put_strains(out, &r);
-    put_seat(out, &r.seat);
-    page_put(out, "</div>\n</div>\n");
-    put_clusters(out, &request->values, &r);
-    if (!attached) put_figure(out, row);
-    put_notes(out, &request->values);
-    put_end(out, row, true);
+    struct ischia_result result;
+    TRY(result_doc_read(&result, NULL, r->row->result_json, strlen(r->row->result_json),
+                        &json_limits_stored, err));
+    put_words(r, &request->values, &result);
+    page_put(r->out, "<div class=\"columns\">\n<div>\n");
+    put_inputs(r, request);
+    page_put(r->out, "</div>\n<div>\n");
+    put_strains(r, &result);
+    put_seat(r, &result.seat);
+    page_put(r->out, "</div>\n</div>\n");
+    put_clusters(r, &request->values, &result);
+    if (!r->attached) put_figure(r);
+    put_notes(r, &request->values);
+    put_end(r, true);
     return ISCHIA_OK;
 }
 
-static void put_failure(struct text_out *out, const struct store_assessment *row)
+/* Why there is no result. Records are kept in English; here its kind and its numbers speak. */
+static void put_reason(const struct report *r, const struct problem *problem, double F_N)
 {
+    const bool on_path =
+        problem->kind == PROBLEM_NOT_CONVERGED && !isnan(problem->last_converged_fraction);
+    if (r->language == LANGUAGE_EN)
+        page_escape(r->out, problem->detail);
+    else if (on_path && problem->last_converged_fraction < 1)
+        page_fill(r->out, r->language, WORD_RESULT_FAILED_PATH,
+                  WORDS(word_number("at", problem->last_converged_fraction * F_N, 4),
+                        word_number("F", F_N, 4)));
+    else if (on_path)
+        page_word(r->out, r->language, WORD_RESULT_FAILED_CHECKS);
+    else
+        page_word(r->out, r->language, problem_kinds[problem->kind].title);
+}
+
+static void put_failure(const struct report *r, const struct ischia_request *request)
+{
+    const struct store_assessment *row = r->row;
     struct problem problem;
-    put_headline(out, queue_state_names[row->state], "There is no result.");
-    page_put(out, "<p>");
+    put_headline(r, queue_state_names[row->state], WORD_DAEMON_REPORT_NO_RESULT);
+    page_put(r->out, "<p>");
     if (row->problem_json != NULL &&
         problem_doc_read(&problem, row->problem_json, strlen(row->problem_json), NULL) == ISCHIA_OK)
-        page_escape(out, problem.detail);
+        put_reason(r, &problem, request->values.param[ISCHIA_F]);
     else
-        page_format(out, "The assessment ended as %s.", queue_state_names[row->state]);
-    page_put(out, "</p>\n");
+        page_fill(r->out, r->language, WORD_DAEMON_REPORT_ENDED_AS,
+                  WORDS(word_text("status", reply_state(r->language, row->state))));
+    page_put(r->out, "</p>\n");
 }
 
-static void put_waiting(struct text_out *out, const struct store_assessment *row)
+static void put_waiting(const struct report *r)
 {
-    char id[UUID_TEXT_BYTES];
-    uuid_format(&row->id, id);
-    put_headline(out, queue_state_names[row->state],
-                 row->state == QUEUE_RUNNING ? "Being solved." : "Waiting for a solver.");
-    page_put(out, "<div class=\"actions\">\n<form method=\"get\" action=\"/v1/assessments/");
-    page_put(out, id);
-    page_put(out, "/report\"><button type=\"submit\" name=\"wait\" value=\"60\">Wait for the "
-                  "result</button></form>\n<form method=\"post\" action=\"/v1/assessments/");
-    page_put(out, id);
-    page_put(out, "/cancel\"><button type=\"submit\">Cancel</button></form>\n</div>\n");
+    put_headline(r, queue_state_names[r->row->state],
+                 r->row->state == QUEUE_RUNNING ? WORD_DAEMON_REPORT_RUNNING
+                                                : WORD_DAEMON_REPORT_QUEUED);
+    page_put(r->out, "<div class=\"actions\">\n<form method=\"get\" action=\"");
+    put_address(r, "/report");
+    page_put(r->out, "\">");
+    if (r->lang_query[0] != '\0') { /* a form's own fields replace the query of its address */
+        page_put(r->out, "<input type=\"hidden\" name=\"lang\" value=\"");
+        page_put(r->out, language_tags[r->language]);
+        page_put(r->out, "\">");
+    }
+    page_put(r->out, "<button type=\"submit\" name=\"wait\" value=\"60\">");
+    page_word(r->out, r->language, WORD_DAEMON_REPORT_WAIT);
+    page_put(r->out, "</button></form>\n<form method=\"post\" action=\"");
+    put_address(r, "/cancel");
+    page_put(r->out, r->lang_query);
+    page_put(r->out, "\"><button type=\"submit\">");
+    page_word(r->out, r->language, WORD_RESULT_CANCEL);
+    page_put(r->out, "</button></form>\n</div>\n");
 }
 
-static enum ischia_code put_report(struct text_out *out, const struct store_assessment *row,
-                                   struct ischia_error *err)
+/* What stands between the beginning and the end of the document. */
+static enum ischia_code put_body(const struct report *r, struct ischia_error *err)
 {
     struct ischia_request request;
-    TRY(documents_request(&request, row, err));
-    page_begin(out, "Ischia: report");
-    page_put(out, "<article class=\"report\">\n");
-    put_title(out, &request);
-    if (row->state == QUEUE_SUCCEEDED) {
-        TRY(put_result(out, row, &request, false, err));
-    } else {
-        if (queue_is_final(row->state))
-            put_failure(out, row);
-        else
-            put_waiting(out, row);
-        put_inputs(out, &request);
-        put_end(out, row, false);
-    }
-    page_put(out, "</article>\n");
-    page_end(out);
+    TRY(documents_request(&request, r->row, err));
+    put_title(r, &request);
+    if (r->row->state == QUEUE_SUCCEEDED) return put_result(r, &request, err);
+    if (queue_is_final(r->row->state))
+        put_failure(r, &request);
+    else
+        put_waiting(r);
+    put_inputs(r, &request);
+    put_end(r, false);
     return ISCHIA_OK;
 }
 
 enum ischia_code report_attachment(char **ret, const struct store_assessment *row,
                                    struct ischia_error *err)
 {
-    struct ischia_request request;
     struct text_out out;
-    enum ischia_code code = ISCHIA_OK;
-    TRY(documents_request(&request, row, err));
+    const struct report r = {&out, LANGUAGE_EN, row, "", true};
     text_out_init(&out);
-    page_put(&out,
-             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Ischia: "
-             "report</title></head>\n<body>\n");
-    put_title(&out, &request);
-    if (row->state == QUEUE_SUCCEEDED) {
-        code = put_result(&out, row, &request, true, err);
-    } else {
-        put_failure(&out, row);
-        put_inputs(&out, &request);
-        put_end(&out, row, false);
-    }
+    page_put(&out, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>");
+    page_word(&out, LANGUAGE_EN, WORD_DAEMON_REPORT_PAGE);
+    page_put(&out, "</title></head>\n<body>\n");
+    const enum ischia_code code = put_body(&r, err);
     page_put(&out, "</body></html>\n");
     if (code == ISCHIA_OK) return text_out_take(&out, ret, NULL, err);
     text_out_finish(&out);
@@ -376,9 +469,18 @@ static void send_report(struct call *call, const struct store_assessment *row,
 {
     struct text_out out;
     struct ischia_error err;
-    text_out_init(&out);
+    char address[UUID_TEXT_BYTES + 32];
+    const enum language language = reply_language(call->request);
+    const struct report r = {&out, language, row, call->lang_query, false};
+    (void)snprintf(address, sizeof address, "/v1/assessments/%s/report", call->id_text);
+    page_begin(&out, language, words_get(language, WORD_DAEMON_REPORT_PAGE));
+    page_languages(&out, language, address);
+    page_put(&out, "<main>\n<article class=\"report\">\n");
     http_header_static(ret, "Cache-Control", "no-store");
-    if (put_report(&out, row, &err) == ISCHIA_OK) {
+    if (put_body(&r, &err) == ISCHIA_OK) {
+        page_put(&out, "</article>\n");
+        page_end(&out);
+        reply_put_language(call->request, ret);
         reply_text(call->request, ret, 200, "text/html; charset=utf-8", &out);
     } else {
         text_out_finish(&out);
@@ -396,8 +498,8 @@ static bool read_wait(struct call *call, struct http_response *ret)
     const enum query_answer found = query_find(call->request->query, "wait", text, sizeof text);
     if (found == QUERY_BAD ||
         (found == QUERY_FOUND && !query_whole_number(text, 0, WAIT_MAX_S, &seconds))) {
-        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, "wait is 0 to %d seconds.",
-                      WAIT_MAX_S);
+        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_QUERY_WAIT,
+                      WORDS(word_count("max", WAIT_MAX_S)));
         return false;
     }
     if (seconds > 0) call->deadline_ms = call->request->begun_ms + seconds * 1000;

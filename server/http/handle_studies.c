@@ -20,8 +20,8 @@ enum { LIST_USUAL = 50, NAME_BYTES = ISCHIA_SUBJECT_BYTES, WORD_BYTES = 32 };
 
 static void reply_no_study(const struct call *call, struct http_response *ret)
 {
-    reply_refusal(call->request, ret, PROBLEM_NOT_FOUND,
-                  "There is no study with this id: it never existed, or it was erased.");
+    reply_refusal_english(call->request, ret, PROBLEM_NOT_FOUND,
+                          "There is no study with this id: it never existed, or it was erased.");
 }
 
 /* The study as it is now; false when ret is the answer already. */
@@ -105,7 +105,7 @@ static bool read_query(struct call *call, struct cohort_query *q, struct http_re
         wrong = "name is 1 to 64 letters, digits, dots, hyphens and underscores.";
     else if (model == QUERY_BAD || resolution == QUERY_BAD)
         wrong = "model or resolution is given twice, too long or malformed.";
-    if (wrong != NULL) reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, "%s", wrong);
+    if (wrong != NULL) reply_refusal_english(call->request, ret, PROBLEM_BAD_REQUEST, "%s", wrong);
     return wrong == NULL;
 }
 
@@ -133,6 +133,7 @@ static bool read_study(struct call *call, struct studies_new *study, struct http
     struct problem problem;
     struct ischia_error err;
     doc_faults_init(&faults);
+    faults.language = reply_language(call->request);
     memset(study, 0, sizeof *study);
     if (!read_query(call, &q, ret)) return false;
     const enum ischia_code code = read_body(call, &q, study, &faults, &err);
@@ -149,16 +150,17 @@ static bool is_accepted(struct call *call, const struct store_study_accepted *ac
                         struct http_response *ret)
 {
     if (accepted->acceptance == STORE_KEY_CONFLICT) {
-        reply_refusal(call->request, ret, PROBLEM_IDEMPOTENCY,
-                      "This Idempotency-Key came with another body before; use a new one.");
+        reply_refusal_english(call->request, ret, PROBLEM_IDEMPOTENCY,
+                              "This Idempotency-Key came with another body before; use a new one.");
         return false;
     }
     if (accepted->acceptance != STORE_FULL) return true;
     http_header_static(ret, "Retry-After", "300");
-    reply_refusal(call->request, ret, PROBLEM_QUEUE_FULL,
-                  "%lld points of studies are waiting, and with this study there would be more "
-                  "than %d, which is the limit; nothing was stored.",
-                  (long long)accepted->waiting, call->service->config.study_limit);
+    reply_refusal_english(
+        call->request, ret, PROBLEM_QUEUE_FULL,
+        "%lld points of studies are waiting, and with this study there would be more "
+        "than %d, which is the limit; nothing was stored.",
+        (long long)accepted->waiting, call->service->config.study_limit);
     return false;
 }
 
@@ -228,8 +230,8 @@ static bool read_page_query(struct call *call, long long *ret_limit, long long *
                       (l == QUERY_ABSENT || query_whole_number(limit, 1, MOST, ret_limit)) &&
                       (c == QUERY_ABSENT || query_whole_number(cursor, 1, INT64_MAX, ret_cursor));
     if (!good)
-        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
-                      "limit is 1 to %d, cursor what an earlier page returned.", (int)MOST);
+        reply_refusal_english(call->request, ret, PROBLEM_BAD_REQUEST,
+                              "limit is 1 to %d, cursor what an earlier page returned.", (int)MOST);
     return good;
 }
 
@@ -295,7 +297,7 @@ void handle_study_cancel(struct call *call, struct http_response *ret)
     else if (answer == STORE_NOT_FOUND)
         reply_no_study(call, ret);
     else if (answer == STORE_CONFLICT)
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT, "This study has ended.");
+        reply_refusal_english(call->request, ret, PROBLEM_CONFLICT, "This study has ended.");
     else
         send_study(call, 200, ret); /* cancelling twice is no fault */
 }
@@ -309,8 +311,8 @@ void handle_study_erase(struct call *call, struct http_response *ret)
     else if (answer == STORE_NOT_FOUND)
         reply_no_study(call, ret);
     else if (answer == STORE_CONFLICT)
-        reply_refusal(call->request, ret, PROBLEM_CONFLICT,
-                      "Points of this study are being solved; cancel it first.");
+        reply_refusal_english(call->request, ret, PROBLEM_CONFLICT,
+                              "Points of this study are being solved; cancel it first.");
     else
         ret->status = 204;
 }

@@ -30,11 +30,13 @@ void handle_parameters(struct call *call, struct http_response *ret)
 {
     struct ischia_error err;
     char *text = NULL;
+    const enum language language = reply_language(call->request);
     http_header_static(ret, "Cache-Control", "no-cache");
-    (void)snprintf(ret->etag, sizeof ret->etag, "\"%s-%d-%s\"", ISCHIA_MODEL_NAME,
-                   ISCHIA_MODEL_VERSION, ISCHIA_VERSION);
+    reply_put_language(call->request, ret);
+    (void)snprintf(ret->etag, sizeof ret->etag, "\"%s-%d-%s-%s\"", ISCHIA_MODEL_NAME,
+                   ISCHIA_MODEL_VERSION, language_tags[language], ISCHIA_VERSION);
     if (reply_not_modified(call->request, ret)) return;
-    if (parameters_doc_text(&text, 2, &err) == ISCHIA_OK)
+    if (parameters_doc_text(&text, language, 2, &err) == ISCHIA_OK)
         http_body(ret, "application/json", text, strlen(text));
     else
         reply_failure(call->request, ret, &err);
@@ -66,10 +68,11 @@ void handle_ready(struct call *call, struct http_response *ret)
     const bool draining = atomic_load(&service->draining);
     if (!stored || !solves || draining) {
         http_header_static(ret, "Retry-After", "5");
-        reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE, "%s",
-                      draining ? "The service is shutting down."
-                      : stored ? "No worker has answered yet."
-                               : "The store cannot be written.");
+        reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE,
+                      draining ? WORD_DAEMON_REFUSAL_SHUTTING_DOWN
+                      : stored ? WORD_DAEMON_REFUSAL_NO_WORKER
+                               : WORD_DAEMON_REFUSAL_STORE,
+                      NULL);
         return;
     }
     http_header_static(ret, "Cache-Control", "no-store");

@@ -196,13 +196,13 @@ static int64_t resume_due(struct http_server *server, int64_t now_ms)
 /* Answers past the library, which cannot answer in the middle of a request. It has sent nothing for
  * this request, so the bytes are the first. Over TLS only the library can write: no words there. */
 static void refuse_on_socket(struct http_server *server, const struct connection *connection,
-                             int status, const char *detail)
+                             int status)
 {
     struct http_response response;
     char text[2048];
     if (!connection->tls) {
         http_response_init(&response, status);
-        server->app.on_refuse(server->app.context, NULL, status, detail, &response);
+        server->app.on_refuse(server->app.context, NULL, status, &response);
         const int n = snprintf(text, sizeof text,
                                "HTTP/1.1 %d %s\r\nContent-Type: %s\r\nContent-Length: %zu\r\n"
                                "Connection: close\r\n\r\n%.*s",
@@ -241,7 +241,7 @@ static void reap_one(struct http_server *server, struct connection *connection, 
     if (!gone) server->app.on_slow_client(server->app.context);
     /* A connection that never asked for anything is closed without words. */
     if (phase == PHASE_RECEIVING && !gone)
-        refuse_on_socket(server, connection, 408, "The request did not arrive in time.");
+        refuse_on_socket(server, connection, 408);
     else
         (void)shutdown(connection->fd, SHUT_RDWR);
 }
@@ -477,11 +477,11 @@ done:
     return sent;
 }
 
-static enum MHD_Result refuse(struct http_exchange *x, int status, const char *detail)
+static enum MHD_Result refuse(struct http_exchange *x, int status)
 {
     struct http_response response;
     http_response_init(&response, status);
-    x->server->app.on_refuse(x->server->app.context, &x->request, status, detail, &response);
+    x->server->app.on_refuse(x->server->app.context, &x->request, status, &response);
     return send_response(x, &response);
 }
 
@@ -556,15 +556,13 @@ static enum MHD_Result take_head(struct http_exchange *x, const char *method)
     x->request.method = method_of(method);
     x->request.has_body = length != 0;
     x->gzip = encodings != NULL && gzip_accepted(encodings);
-    if (head.bytes > HEAD_BYTES_MAX)
-        return refuse(x, 431, "The request's head is larger than 16 KiB.");
+    if (head.bytes > HEAD_BYTES_MAX) return refuse(x, 431);
     http_response_init(&refusal, 500);
     if (!app->on_head(app->context, &x->request, &x->body_max, &refusal))
         return refuse_head(x, &refusal, length);
     if (length < 0 || (uint64_t)length <= x->body_max) return MHD_YES;
     http_response_init(&refusal, 413);
-    app->on_refuse(app->context, &x->request, 413, "The body is larger than this route takes.",
-                   &refusal);
+    app->on_refuse(app->context, &x->request, 413, &refusal);
     return refuse_head(x, &refusal, length);
 }
 
@@ -586,8 +584,7 @@ static enum MHD_Result discard(struct http_exchange *x, size_t size)
     x->discarded += size;
     if (x->discarded <= DISCARD_BYTES_MAX) return MHD_YES;
     if (enter_phase(x->connection, PHASE_REAPED, INT64_MAX))
-        refuse_on_socket(x->server, x->connection, 413,
-                         "The body is larger than this route takes.");
+        refuse_on_socket(x->server, x->connection, 413);
     return MHD_NO;
 }
 
@@ -598,8 +595,7 @@ static enum MHD_Result take_body(struct http_exchange *x, const char *data, size
     if (needed > x->body_max) {
         struct http_response refusal;
         http_response_init(&refusal, 413);
-        x->server->app.on_refuse(x->server->app.context, &x->request, 413,
-                                 "The body is larger than this route takes.", &refusal);
+        x->server->app.on_refuse(x->server->app.context, &x->request, 413, &refusal);
         return refuse_head(x, &refusal, -1);
     }
     if (!grow_body(x, needed)) return MHD_NO;

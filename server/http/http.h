@@ -47,6 +47,7 @@ struct http_request {
     int64_t begun_ms; /* monotonic: when its first line was read                    */
     int woken;        /* how often it was called again after a wait                   */
     void *state;      /* the application's own; it frees it in on_done                */
+    int language;     /* the application's own: what the client reads                 */
     struct http_exchange *exchange;
 };
 
@@ -119,7 +120,7 @@ struct http_app {
     void (*on_request)(void *context, struct http_request *request, struct http_response *ret);
     /* The transport refuses (408, 413, 431): the application words it. request is NULL when there
      * is none to speak of; the answer may then have no headers of its own. */
-    void (*on_refuse)(void *context, struct http_request *request, int status, const char *detail,
+    void (*on_refuse)(void *context, struct http_request *request, int status,
                       struct http_response *ret);
     /* The last call for a request; status 0 when no answer was sent. */
     void (*on_done)(void *context, struct http_request *request, int status);

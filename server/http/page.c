@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "api/case_doc.h"
+#include "api/case_words.h"
 #include "server/http/query.h"
 #include "server/http/reply.h"
 #include "server/http/routes.h"
@@ -40,15 +41,50 @@ void page_format(struct text_out *out, const char *format, ...)
     page_escape(out, text);
 }
 
-void page_begin(struct text_out *out, const char *title)
+void page_word(struct text_out *out, enum language language, enum word word)
+{
+    page_escape(out, words_get(language, word));
+}
+
+void page_fill(struct text_out *out, enum language language, enum word word,
+               const struct word_value *values)
+{
+    char text[1024];
+    page_escape(out, words_fill(text, sizeof text, language, word, values));
+}
+
+void page_begin(struct text_out *out, enum language language, const char *title)
 {
     text_out_init(out);
-    page_put(out, "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+    page_put(out, "<!doctype html>\n<html lang=\"");
+    page_put(out, language_tags[language]);
+    page_put(out, "\">\n<head>\n<meta charset=\"utf-8\">\n"
                   "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
                   "<title>");
     page_escape(out, title);
     page_put(out, "</title>\n<link rel=\"stylesheet\" href=\"/assets/plain.css\">\n</head>\n"
-                  "<body>\n<main>\n");
+                  "<body>\n");
+}
+
+void page_languages(struct text_out *out, enum language language, const char *address)
+{
+    page_put(out, "<nav class=\"languages\" aria-label=\"");
+    page_word(out, language, WORD_APP_LANGUAGE);
+    page_put(out, "\">");
+    for (int l = 0; l < LANGUAGE_COUNT; l++) {
+        page_put(out, l == (int)language ? "<a aria-current=\"true\" lang=\"" : "<a lang=\"");
+        page_put(out, language_tags[l]);
+        page_put(out, "\" hreflang=\"");
+        page_put(out, language_tags[l]);
+        page_put(out, "\" href=\"");
+        page_escape(out, address);
+        page_put(out, "?lang=");
+        page_put(out, language_tags[l]);
+        page_put(out, "\">");
+        page_word(out, (enum language)l, WORD_LANGUAGE_NAME);
+        page_put(out, "</a>\n");
+    }
+    page_put(out, "</nav>\n");
 }
 
 void page_end(struct text_out *out) { page_put(out, "</main>\n</body>\n</html>\n"); }
@@ -57,6 +93,8 @@ void page_end(struct text_out *out) { page_put(out, "</main>\n</body>\n</html>\n
 
 struct form {
     struct text_out *out;
+    enum language language;
+    const char *lang_query;
     const char *sent; /* the body as a query string; NULL: none */
     const struct doc_faults *faults;
 };
@@ -135,31 +173,41 @@ static void put_value(const struct form *form, const char *key)
     put_faults(form, key);
 }
 
-static void put_parameter(const struct form *form, const struct ischia_param_info *info)
+static void put_parameter(const struct form *form, const struct ischia_param_info *info,
+                          const struct param_words *words)
 {
-    char label[128];
-    (void)snprintf(label, sizeof label, "%s %s (%s, %g to %g)", info->name, info->key, info->unit,
-                   info->accepted_min, info->accepted_max);
+    char label[160];
+    (void)words_fill(label, sizeof label, form->language, WORD_DAEMON_FORM_LABEL,
+                     WORDS(word_text("name", words_get(form->language, words->name)),
+                           word_text("key", info->key), word_text("unit", info->unit),
+                           word_number("min", info->accepted_min, 6),
+                           word_number("max", info->accepted_max, 6)));
     put_label(form, info->key, label);
     page_put(form->out, "\" inputmode=\"decimal\" required autocomplete=\"off\" title=\"");
-    page_escape(form->out, info->description);
+    page_word(form->out, form->language, words->help);
     put_value(form, info->key);
     page_put(form->out, "<p class=\"help\">");
-    page_escape(form->out, info->description);
+    page_word(form->out, form->language, words->help);
     page_put(form->out, "</p>\n");
 }
 
 static void put_sides(const struct form *form)
 {
+    static const enum word sides[ISCHIA_SIDE_COUNT] = {
+        [ISCHIA_SIDE_NONE] = WORD_DAEMON_FORM_NO_SIDE,
+        [ISCHIA_SIDE_LEFT] = WORD_SIDE_LEFT,
+        [ISCHIA_SIDE_RIGHT] = WORD_SIDE_RIGHT,
+    };
     char side[16];
     sent_value(form, "side", side, sizeof side);
-    page_put(form->out, "<p><label for=\"side\">Side</label>\n<select id=\"side\" name=\"side\">\n"
-                        "<option value=\"\">not given</option>\n");
-    for (int i = 1; i < ISCHIA_SIDE_COUNT; i++) {
-        page_put(form->out, "<option");
-        if (strcmp(side, ischia_side_names[i]) == 0) page_put(form->out, " selected");
-        page_put(form->out, ">");
+    page_put(form->out, "<p><label for=\"side\">");
+    page_word(form->out, form->language, WORD_LIST_SIDE);
+    page_put(form->out, "</label>\n<select id=\"side\" name=\"side\">\n");
+    for (int i = 0; i < ISCHIA_SIDE_COUNT; i++) {
+        page_put(form->out, "<option value=\"");
         page_put(form->out, ischia_side_names[i]);
+        page_put(form->out, strcmp(side, ischia_side_names[i]) == 0 ? "\" selected>" : "\">");
+        page_word(form->out, form->language, sides[i]);
         page_put(form->out, "</option>\n");
     }
     page_put(form->out, "</select></p>\n");
@@ -168,21 +216,29 @@ static void put_sides(const struct form *form)
 
 static void put_form(const struct form *form)
 {
-    page_put(form->out,
-             "<h1>Tissue under one ischium</h1>\n<p>Seven measured numbers of one side, each "
-             "with a decimal point or a decimal comma.</p>\n<form method=\"post\" "
-             "action=\"/v1/assessments\">\n");
+    const enum language language = form->language;
+    page_put(form->out, "<main>\n<h1>");
+    page_word(form->out, language, WORD_DAEMON_FORM_TITLE);
+    page_put(form->out, "</h1>\n<p>");
+    page_word(form->out, language, WORD_DAEMON_FORM_ABOUT);
+    page_put(form->out, "</p>\n<form method=\"post\" action=\"/v1/assessments");
+    page_put(form->out, form->lang_query);
+    page_put(form->out, "\">\n");
     put_other_faults(form);
-    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) put_parameter(form, &ischia_params[i]);
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
+        put_parameter(form, &ischia_params[i], &param_words[i]);
     put_sides(form);
-    put_label(form, "subject", "Subject (a pseudonym, never a name; optional)");
+    put_label(form, "subject", words_get(language, WORD_DAEMON_FORM_SUBJECT));
     page_put(form->out, "\" maxlength=\"64\" autocomplete=\"off");
     put_value(form, "subject");
-    put_label(form, "measured_at", "Measured on (YYYY-MM-DD; optional)");
+    put_label(form, "measured_at", words_get(language, WORD_DAEMON_FORM_MEASURED_AT));
     page_put(form->out, "\" autocomplete=\"off");
     put_value(form, "measured_at");
-    page_put(form->out, "<p><button type=\"submit\">Assess</button></p>\n</form>\n"
-                        "<p><a href=\"/docs\">How programs use this service</a></p>\n");
+    page_put(form->out, "<p><button type=\"submit\">");
+    page_word(form->out, language, WORD_DAEMON_FORM_SUBMIT);
+    page_put(form->out, "</button></p>\n</form>\n<p><a href=\"/docs\">");
+    page_word(form->out, language, WORD_DAEMON_FORM_PROGRAMS);
+    page_put(form->out, "</a></p>\n");
 }
 
 void page_form(struct call *call, const char *body, size_t size, const struct doc_faults *faults,
@@ -190,12 +246,16 @@ void page_form(struct call *call, const char *body, size_t size, const struct do
 {
     struct text_out out;
     char *sent = body == NULL ? NULL : strndup(body, size);
-    const struct form form = {&out, sent, faults};
-    page_begin(&out, "Ischia: assess one side");
+    const enum language language = reply_language(call->request);
+    const struct form form = {&out, language, call->lang_query, sent, faults};
+    page_begin(&out, language, words_get(language, WORD_DAEMON_FORM_PAGE));
+    /* A form that was refused is no address: in another language it would be empty. */
+    if (body == NULL) page_languages(&out, language, "/form");
     put_form(&form);
     page_end(&out);
     free(sent);
     http_header_static(ret, "Cache-Control", "no-store");
+    reply_put_language(call->request, ret);
     reply_text(call->request, ret, faults == NULL ? 200 : 422, "text/html; charset=utf-8", &out);
 }
 
@@ -204,7 +264,7 @@ void page_form(struct call *call, const char *body, size_t size, const struct do
 void page_asset(struct call *call, const struct asset *asset, struct http_response *ret)
 {
     if (asset == NULL) {
-        reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, "There is nothing at this address.");
+        reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, WORD_DAEMON_REFUSAL_NO_ADDRESS, NULL);
         return;
     }
     http_header_static(ret, "Cache-Control", "no-cache");
@@ -223,15 +283,25 @@ void handle_asset(struct call *call, struct http_response *ret)
     page_asset(call, asset_find(name), ret);
 }
 
+/* "index.html" is English, "index.fr.html" French. */
+static const struct asset *clinic_page(enum language language)
+{
+    char name[24];
+    (void)snprintf(name, sizeof name, "index.%s.html", language_tags[language]);
+    return asset_find(language == LANGUAGE_EN ? "index.html" : name);
+}
+
 /* The clinic page where the build has one, the plain form where it has not. */
 void handle_home(struct call *call, struct http_response *ret)
 {
-    const struct asset *page = asset_find("index.html");
+    const struct asset *page = clinic_page(reply_language(call->request));
     if (page != NULL) {
+        reply_put_language(call->request, ret);
         page_asset(call, page, ret);
     } else if (call->id_text[0] != '\0') {
         ret->status = 303;
-        http_header(ret, "Location", "/v1/assessments/%s/report", call->id_text);
+        http_header(ret, "Location", "/v1/assessments/%s/report%s", call->id_text,
+                    call->lang_query);
     } else {
         page_form(call, NULL, 0, NULL, ret);
     }

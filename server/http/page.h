@@ -6,6 +6,7 @@
 
 #include "api/faults.h"
 #include "api/text.h"
+#include "api/words.h"
 #include "server/http/assets.h"
 #include "server/http/http.h"
 #include "server/http/service.h"
@@ -19,8 +20,15 @@ void page_escape(struct text_out *out, const char *text);
 /* The same, printf-style; cut after 1 KiB. */
 __attribute__((format(printf, 2, 3))) void page_format(struct text_out *out, const char *format,
                                                        ...);
+/* Adds a word, escaped. */
+void page_word(struct text_out *out, enum language language, enum word word);
+/* The same with values, as words_fill takes them; cut after 1 KiB. */
+void page_fill(struct text_out *out, enum language language, enum word word,
+               const struct word_value *values);
 /* Starts a document in an empty out. */
-void page_begin(struct text_out *out, const char *title);
+void page_begin(struct text_out *out, enum language language, const char *title);
+/* The same page in the other languages; address: without a query. Not printed. */
+void page_languages(struct text_out *out, enum language language, const char *address);
 /* Closes what page_begin opened. */
 void page_end(struct text_out *out);
 

@@ -184,6 +184,40 @@ int query_accept(const char *accept, const char *const *types)
     return best;
 }
 
+/* Of the entries for a language, "de" and "de-CH", the best; of "*" where it has none. */
+static double language_quality(const char *accept_language, const char *tag)
+{
+    double best = 0, others = 0;
+    bool named = false;
+    for (const char *at = accept_language; *at != '\0';) {
+        at += strspn(at, " \t,");
+        const size_t length = strcspn(at, ","), primary = strcspn(at, " \t;,-");
+        const char *q = memmem(at, length, "q=", 2);
+        const double quality = q == NULL ? 1.0 : strtod(q + 2, NULL);
+        if (primary == strlen(tag) && strncasecmp(at, tag, primary) == 0) {
+            best = quality > best ? quality : best;
+            named = true;
+        } else if (primary == 1 && at[0] == '*') {
+            others = quality > others ? quality : others;
+        }
+        at += length;
+    }
+    return named ? best : others;
+}
+
+int query_language(const char *accept_language, const char *const *tags)
+{
+    int best = 0;
+    double best_quality = 0;
+    for (int i = 0; accept_language != NULL && tags[i] != NULL; i++) {
+        const double quality = language_quality(accept_language, tags[i]);
+        if (quality <= best_quality) continue;
+        best = i;
+        best_quality = quality;
+    }
+    return best;
+}
+
 bool query_media_type_is(const char *content_type, const char *type)
 {
     const size_t length = strcspn(content_type, "; \t");

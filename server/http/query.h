@@ -36,6 +36,10 @@ int query_prefer_wait(const char *prefer, int max);
  * first. -1: none. */
 int query_accept(const char *accept, const char *const *types);
 
+/* Which of `tags` (NULL-ended) an Accept-Language header likes best, by the language alone: "de-CH"
+ * is "de". The first when it likes none, or is NULL. */
+int query_language(const char *accept_language, const char *const *tags);
+
 /* "application/json; charset=utf-8" is "application/json". */
 bool query_media_type_is(const char *content_type, const char *type);
 

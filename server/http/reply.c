@@ -42,6 +42,31 @@ static const struct error_form *error_form(const struct http_request *request)
     return form;
 }
 
+enum language reply_language(const struct http_request *request)
+{
+    return request == NULL ? LANGUAGE_EN : (enum language)request->language;
+}
+
+void reply_put_language(const struct http_request *request, struct http_response *ret)
+{
+    for (int i = 0; i < ret->header_count; i++)
+        if (strcmp(ret->header[i].name, "Content-Language") == 0) return; /* a page that failed */
+    http_header_static(ret, "Content-Language", language_tags[reply_language(request)]);
+    http_header_static(ret, "Vary", "Accept-Language");
+}
+
+const char *reply_state(enum language language, enum queue_state state)
+{
+    static const enum word words[QUEUE_STATE_COUNT] = {
+        [QUEUE_QUEUED] = WORD_DAEMON_STATE_QUEUED,
+        [QUEUE_RUNNING] = WORD_DAEMON_STATE_RUNNING,
+        [QUEUE_SUCCEEDED] = WORD_DAEMON_STATE_SUCCEEDED,
+        [QUEUE_FAILED] = WORD_DAEMON_STATE_FAILED,
+        [QUEUE_CANCELLED] = WORD_DAEMON_STATE_CANCELLED,
+    };
+    return words_get(language, words[state]);
+}
+
 void reply_problem(const struct http_request *request, struct problem *problem,
                    struct http_response *ret)
 {
@@ -52,7 +77,9 @@ void reply_problem(const struct http_request *request, struct problem *problem,
     ret->action = HTTP_SEND;
     ret->etag[0] = '\0';
     set_instance(problem, request);
+    problem->language = reply_language(request);
     http_header_static(ret, "Cache-Control", "no-store");
+    reply_put_language(request, ret);
     if (form->text(&text, problem, &err) == ISCHIA_OK) {
         http_body(ret, form->type, text, strlen(text));
         return;
@@ -62,7 +89,15 @@ void reply_problem(const struct http_request *request, struct problem *problem,
 }
 
 void reply_refusal(const struct http_request *request, struct http_response *ret,
-                   enum problem_kind kind, const char *format, ...)
+                   enum problem_kind kind, enum word word, const struct word_value *values)
+{
+    struct problem problem;
+    problem_say(&problem, kind, reply_language(request), word, values);
+    reply_problem(request, &problem, ret);
+}
+
+void reply_refusal_english(const struct http_request *request, struct http_response *ret,
+                           enum problem_kind kind, const char *format, ...)
 {
     struct problem problem;
     char detail[sizeof problem.detail];
@@ -88,14 +123,12 @@ void reply_failure(const struct http_request *request, struct http_response *ret
     LOG_ERROR("request failed", "code=%s detail=%s where=%s:%d", ischia_code_name(err->code),
               log_quote(&message, err->message), err->file == NULL ? "?" : err->file, err->line);
     http_header_static(ret, "Retry-After", "5");
-    reply_refusal(request, ret, failure_kind(err->code),
-                  "The service could not do this now; nothing was changed. Its log says why.");
+    reply_refusal(request, ret, failure_kind(err->code), WORD_DAEMON_REFUSAL_FAILURE, NULL);
 }
 
 void reply_no_assessment(const struct call *call, struct http_response *ret)
 {
-    reply_refusal(call->request, ret, PROBLEM_NOT_FOUND,
-                  "There is no assessment with this id: it never existed, or it was erased.");
+    reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, WORD_DAEMON_REFUSAL_NO_ASSESSMENT, NULL);
 }
 
 void reply_text(const struct http_request *request, struct http_response *ret, int status,

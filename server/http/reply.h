@@ -9,13 +9,24 @@
 
 /* Answers that every route gives. `request` may be NULL where there is none. */
 
+/* What the client reads, as routes.c found out; English when request is NULL. */
+enum language reply_language(const struct http_request *request);
+/* Says in which language the body is, and that it depends on the request. */
+void reply_put_language(const struct http_request *request, struct http_response *ret);
+
+/* A state in words. */
+const char *reply_state(enum language language, enum queue_state state);
+
 /* The problem, with its status and the request's path (never its query) as instance. */
 void reply_problem(const struct http_request *request, struct problem *problem,
                    struct http_response *ret);
-/* A problem with nothing but a detail (printf-style). */
+/* A problem with nothing but a detail, in the client's language; values as for words_fill. */
+void reply_refusal(const struct http_request *request, struct http_response *ret,
+                   enum problem_kind kind, enum word word, const struct word_value *values);
+/* The same in English (printf-style): for protocols that only programs speak. */
 __attribute__((format(printf, 4, 5))) void
-reply_refusal(const struct http_request *request, struct http_response *ret, enum problem_kind kind,
-              const char *format, ...);
+reply_refusal_english(const struct http_request *request, struct http_response *ret,
+                      enum problem_kind kind, const char *format, ...);
 /* A call that failed for reasons of ours: 500, 503 or 507, logged; the details stay in the log. */
 void reply_failure(const struct http_request *request, struct http_response *ret,
                    const struct ischia_error *err);

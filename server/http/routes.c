@@ -62,7 +62,8 @@ enum { CASE_BYTES_MAX = 64 * 1024, EMPTY_BODY_BYTES_MAX = 1024, ROUTES_MAX = 64 
 
 const struct route routes[] = {
     {HTTP_POST, "/v1/assessments", "POST /v1/assessments", handle_submit, AUTH_ASSESS,
-     CASE_BYTES_MAX, TYPES(JSON, FORM), TYPES(JSON, "text/html"), NULL, "assessment.create", false},
+     CASE_BYTES_MAX, TYPES(JSON, FORM), TYPES(JSON, "text/html"), TYPES("lang"),
+     "assessment.create", false},
     {HTTP_GET, "/v1/assessments", "GET /v1/assessments", handle_list, AUTH_READ, 0, NULL,
      TYPES(JSON, "text/csv"), TYPES("subject", "side", "status", "limit", "cursor"),
      "assessment.list", false},
@@ -71,15 +72,15 @@ const struct route routes[] = {
     {HTTP_DELETE, ASSESSMENT, "DELETE " ASSESSMENT, handle_erase, AUTH_ADMIN, EMPTY_BODY_BYTES_MAX,
      NULL, NULL, NULL, "assessment.erase", false},
     {HTTP_POST, ASSESSMENT "/cancel", "POST " ASSESSMENT "/cancel", handle_cancel, AUTH_ASSESS,
-     EMPTY_BODY_BYTES_MAX, NULL, TYPES(JSON), NULL, "assessment.cancel", false},
+     EMPTY_BODY_BYTES_MAX, NULL, TYPES(JSON), TYPES("lang"), "assessment.cancel", false},
     {HTTP_GET, ASSESSMENT "/events", "GET " ASSESSMENT "/events", handle_events, AUTH_READ, 0, NULL,
      TYPES("text/event-stream"), NULL, "assessment.read", false},
     {HTTP_GET, ASSESSMENT "/field.vtu", "GET " ASSESSMENT "/field.vtu", handle_field, AUTH_READ, 0,
      NULL, TYPES("application/vnd.vtk.vtu", "application/xml"), NULL, "assessment.read", false},
     {HTTP_GET, ASSESSMENT "/section.svg", "GET " ASSESSMENT "/section.svg", handle_section,
-     AUTH_READ, 0, NULL, TYPES("image/svg+xml"), NULL, "assessment.read", false},
+     AUTH_READ, 0, NULL, TYPES("image/svg+xml"), TYPES("lang"), "assessment.read", false},
     {HTTP_GET, ASSESSMENT "/report", "GET " ASSESSMENT "/report", handle_report, AUTH_READ, 0, NULL,
-     TYPES("text/html"), TYPES("wait"), "assessment.read", false},
+     TYPES("text/html"), TYPES("wait", "lang"), "assessment.read", false},
     {HTTP_POST, "/v1/estimates", "POST /v1/estimates", handle_estimate, AUTH_ASSESS, CASE_BYTES_MAX,
      TYPES(JSON), TYPES(JSON), NULL, NULL, false},
     {HTTP_POST, "/v1/studies", "POST /v1/studies", handle_study_submit, AUTH_ASSESS,
@@ -96,7 +97,7 @@ const struct route routes[] = {
     {HTTP_GET, STUDY "/results", "GET " STUDY "/results", handle_study_results, AUTH_READ, 0, NULL,
      TYPES(JSON, CSV), NULL, "study.read", false},
     {HTTP_GET, "/v1/parameters", "GET /v1/parameters", handle_parameters, 0, 0, NULL, TYPES(JSON),
-     NULL, NULL, false},
+     TYPES("lang"), NULL, false},
     {HTTP_GET, "/v1/changes", "GET /v1/changes", handle_changes, AUTH_READ, 0, NULL, TYPES(JSON),
      TYPES("since", "limit"), "changes.read", false},
     {HTTP_GET, "/openapi.json", "GET /openapi.json", handle_openapi, 0, 0, NULL, TYPES(JSON), NULL,
@@ -135,13 +136,14 @@ const struct route routes[] = {
     CDS_HOOK("ischia-order-select"),
     CDS_FEEDBACK("ischia-order-select"),
     {HTTP_GET, "/docs", "GET /docs", handle_docs, 0, 0, NULL, TYPES("text/html"), NULL, NULL, true},
-    {HTTP_GET, "/", "GET /", handle_home, 0, 0, NULL, TYPES("text/html"), TYPES("from"), NULL,
-     true},
-    {HTTP_GET, "/form", "GET /form", handle_form, 0, 0, NULL, TYPES("text/html"), NULL, NULL, true},
+    {HTTP_GET, "/", "GET /", handle_home, 0, 0, NULL, TYPES("text/html"), TYPES("from", "lang"),
+     NULL, true},
+    {HTTP_GET, "/form", "GET /form", handle_form, 0, 0, NULL, TYPES("text/html"), TYPES("lang"),
+     NULL, true},
     {HTTP_GET, "/assessments", "GET /assessments", handle_home, 0, 0, NULL, TYPES("text/html"),
-     TYPES("subject", "side", "status", "limit", "cursor", "with"), NULL, true},
+     TYPES("subject", "side", "status", "limit", "cursor", "with", "lang"), NULL, true},
     {HTTP_GET, "/assessments/{id}", "GET /assessments/{id}", handle_home, 0, 0, NULL,
-     TYPES("text/html"), TYPES("with"), NULL, true},
+     TYPES("text/html"), TYPES("with", "lang"), NULL, true},
     {HTTP_GET, "/assets/{file}", "GET /assets/{file}", handle_asset, 0, 0, NULL, NULL, NULL, NULL,
      true},
 };
@@ -289,14 +291,14 @@ static void put_allow(struct http_response *ret, unsigned allowed)
 static bool refuse_route(struct call *call, struct http_response *ret)
 {
     if (call->allowed == 0) {
-        reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, "There is nothing at this address.");
+        reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, WORD_DAEMON_REFUSAL_NO_ADDRESS, NULL);
         return false;
     }
     put_allow(ret, call->allowed);
     if (call->request->method == HTTP_OPTIONS)
         ret->status = 204;
     else
-        reply_refusal(call->request, ret, PROBLEM_METHOD, "The Allow header lists what does.");
+        reply_refusal(call->request, ret, PROBLEM_METHOD, WORD_DAEMON_REFUSAL_METHOD, NULL);
     return false;
 }
 
@@ -334,17 +336,19 @@ static bool agree_on_types(struct call *call, struct http_response *ret)
     const struct route *route = call->route;
     const char *content_type = http_request_header(call->request, "Content-Type");
     if (route->takes != NULL && !takes_type(route, content_type)) {
-        reply_refusal(call->request, ret, PROBLEM_MEDIA_TYPE_WRONG, "Send %s%s%s.", route->takes[0],
-                      route->takes[1] == NULL ? "" : " or ",
-                      route->takes[1] == NULL ? "" : route->takes[1]);
+        reply_refusal(
+            call->request, ret, PROBLEM_MEDIA_TYPE_WRONG,
+            route->takes[1] == NULL ? WORD_DAEMON_REFUSAL_SEND : WORD_DAEMON_REFUSAL_SEND_EITHER,
+            WORDS(word_text("type", route->takes[0]), word_text("other", route->takes[1])));
         return false;
     }
     if (route->gives == NULL) return true;
     call->accepted = query_accept(wanted_type(call), route->gives);
     if (call->accepted >= 0) return true;
-    reply_refusal(call->request, ret, PROBLEM_NOT_ACCEPTABLE, "This is given as %s%s%s.",
-                  route->gives[0], route->gives[1] == NULL ? "" : " or ",
-                  route->gives[1] == NULL ? "" : route->gives[1]);
+    reply_refusal(call->request, ret, PROBLEM_NOT_ACCEPTABLE,
+                  route->gives[1] == NULL ? WORD_DAEMON_REFUSAL_GIVEN_AS
+                                          : WORD_DAEMON_REFUSAL_GIVEN_AS_EITHER,
+                  WORDS(word_text("type", route->gives[0]), word_text("other", route->gives[1])));
     return false;
 }
 
@@ -358,8 +362,47 @@ static bool read_query(struct call *call, struct http_response *ret)
     if (fhir && prefer != NULL && strstr(prefer, "handling=lenient") != NULL) return true;
     if (call->route->is_page || !query_unknown(call->request->query, known, name, sizeof name))
         return true;
-    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
-                  "This address takes no query parameter '%.60s'.", name);
+    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_QUERY_KEY,
+                  WORDS(word_text("name", name)));
+    return false;
+}
+
+static bool speaks_english_only(const char *target)
+{
+    return strncmp(target, "/fhir", 5) == 0 || strncmp(target, "/cds-services", 13) == 0;
+}
+
+/* "lang" in the query comes before the header; what programs speak among each other is English. */
+static void read_language(struct call *call)
+{
+    char tag[8];
+    enum language asked;
+    struct http_request *request = call->request;
+    if (speaks_english_only(request->target)) return;
+    request->language =
+        query_language(http_request_header(request, "Accept-Language"), language_tags);
+    if (query_find(request->query, "lang", tag, sizeof tag) != QUERY_FOUND ||
+        !words_language(tag, &asked))
+        return;
+    request->language = (int)asked;
+    (void)snprintf(call->lang_query, sizeof call->lang_query, "?lang=%s", language_tags[asked]);
+}
+
+/* A language that we do not have is refused, but for pages: those are there for people. */
+static bool has_known_language(struct call *call, struct http_response *ret)
+{
+    char known[4 * LANGUAGE_COUNT + 1] = "";
+    const bool absent =
+        query_find(call->request->query, "lang", known, sizeof known) == QUERY_ABSENT;
+    if (absent || call->lang_query[0] != '\0' || call->route->is_page) return true;
+    known[0] = '\0';
+    for (int l = 0; l < LANGUAGE_COUNT; l++) {
+        const size_t used = strlen(known);
+        (void)snprintf(known + used, sizeof known - used, "%s%s", l == 0 ? "" : ", ",
+                       language_tags[l]);
+    }
+    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_QUERY_LANGUAGE,
+                  WORDS(word_text("known", known)));
     return false;
 }
 
@@ -368,8 +411,7 @@ static bool read_path(struct call *call, struct http_response *ret)
     char path[HTTP_PATH_BYTES], id[64] = "";
     const char *target = call->request->target;
     if (!query_decode(target, strcspn(target, "?"), false, path, sizeof path)) {
-        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
-                      "The address is too long or not well formed.");
+        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_ADDRESS, NULL);
         return false;
     }
     call->route = route_find(call->request->method, path, id, sizeof id, call->rest,
@@ -384,8 +426,7 @@ static bool has_usable_id(struct call *call, struct http_response *ret)
     if (strstr(call->route->path, "/v1/") == NULL || strstr(call->route->path, "{id}") == NULL ||
         call->id_text[0] != '\0')
         return true;
-    reply_refusal(call->request, ret, PROBLEM_NOT_FOUND,
-                  "There is nothing with this id: it is none that this service gives out.");
+    reply_no_assessment(call, ret);
     return false;
 }
 
@@ -395,8 +436,7 @@ static bool refuse_while_stopping(struct call *call, struct http_response *ret)
         !atomic_load_explicit(&call->service->draining, memory_order_relaxed))
         return true;
     http_header_static(ret, "Retry-After", "10");
-    reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE,
-                  "The service is shutting down; nothing was changed.");
+    reply_refusal(call->request, ret, PROBLEM_UNAVAILABLE, WORD_DAEMON_REFUSAL_STOPPING, NULL);
     return false;
 }
 
@@ -405,7 +445,7 @@ static bool admit(struct call *call, struct http_response *ret)
     if (!read_path(call, ret) || !guard_admit(call, ret)) return false;
     if (call->route == NULL) return refuse_route(call, ret);
     return refuse_while_stopping(call, ret) && has_usable_id(call, ret) &&
-           agree_on_types(call, ret) && read_query(call, ret);
+           agree_on_types(call, ret) && read_query(call, ret) && has_known_language(call, ret);
 }
 
 static bool on_head(void *context, struct http_request *request, size_t *ret_body_max,
@@ -419,6 +459,7 @@ static bool on_head(void *context, struct http_request *request, size_t *ret_bod
     call->service = context;
     call->request = request;
     request->state = call;
+    read_language(call);
     if (!admit(call, ret_refusal)) {
         guard_headers(call, ret_refusal);
         return false;
@@ -435,14 +476,23 @@ static void on_request(void *context, struct http_request *request, struct http_
     if (ret->action != HTTP_WAIT) guard_headers(call, ret);
 }
 
-static void on_refuse(void *context, struct http_request *request, int status, const char *detail,
+static void on_refuse(void *context, struct http_request *request, int status,
                       struct http_response *ret)
 {
-    const enum problem_kind kind = status == 408   ? PROBLEM_TIMEOUT
-                                   : status == 413 ? PROBLEM_TOO_LARGE
-                                                   : PROBLEM_HEADERS_TOO_LARGE;
+    static const struct {
+        int status;
+        enum problem_kind kind;
+        enum word detail;
+    } refusals[] = {
+        {408, PROBLEM_TIMEOUT, WORD_DAEMON_REFUSAL_LATE},
+        {413, PROBLEM_TOO_LARGE, WORD_DAEMON_REFUSAL_BODY},
+        {431, PROBLEM_HEADERS_TOO_LARGE, WORD_DAEMON_REFUSAL_HEAD},
+    };
+    const size_t last = sizeof refusals / sizeof refusals[0] - 1;
+    size_t i = 0;
     (void)context;
-    reply_refusal(request, ret, kind, "%s", detail);
+    while (i < last && refusals[i].status != status) i++;
+    reply_refusal(request, ret, refusals[i].kind, refusals[i].detail, NULL);
     guard_headers(request == NULL ? NULL : request->state, ret);
 }
 

@@ -63,6 +63,7 @@ struct call {
     struct http_request *request;
     const struct route *route; /* NULL: no such path */
     unsigned allowed;          /* methods that the path takes, bit by enum http_method */
+    char lang_query[16];       /* "?lang=fr" when the address asks for a language, else ""     */
     int accepted;              /* which of the route's media types the client likes best */
     struct auth_identity who;
     char client[80]; /* rate limits and idempotency keys are by this: token or address */

@@ -29,9 +29,8 @@ bool submit_read_key(struct call *call, const char **ret_key, struct http_respon
     bool good = length > 0 && length < IDEMPOTENCY_KEY_BYTES;
     for (size_t i = 0; i < length; i++) good = good && key[i] > 0x20 && key[i] < 0x7f;
     if (good) return true;
-    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
-                  "Idempotency-Key has 1 to %d printable ASCII characters without blanks.",
-                  IDEMPOTENCY_KEY_BYTES - 1);
+    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_KEY,
+                  WORDS(word_count("max", IDEMPOTENCY_KEY_BYTES - 1)));
     return false;
 }
 
@@ -102,14 +101,13 @@ static void refuse_acceptance(struct call *call, const struct store_accepted *ac
                               struct http_response *ret)
 {
     if (accepted->acceptance == STORE_KEY_CONFLICT) {
-        reply_refusal(call->request, ret, PROBLEM_IDEMPOTENCY,
-                      "This Idempotency-Key came with another body before; use a new one.");
+        reply_refusal(call->request, ret, PROBLEM_IDEMPOTENCY, WORD_DAEMON_REFUSAL_KEY_CONFLICT,
+                      NULL);
         return;
     }
     http_header_static(ret, "Retry-After", "30");
-    reply_refusal(call->request, ret, PROBLEM_QUEUE_FULL,
-                  "%d assessments are waiting, which is the limit; nothing was stored.",
-                  accepted->queued);
+    reply_refusal(call->request, ret, PROBLEM_QUEUE_FULL, WORD_DAEMON_REFUSAL_QUEUE_FULL,
+                  WORDS(word_count("n", accepted->queued)));
 }
 
 bool submit_take_accepted(struct call *call, struct http_response *ret)

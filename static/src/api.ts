@@ -2,6 +2,7 @@
 //
 // The one place that talks to the daemon. Every address is a path: nothing but the daemon that
 // served the page is ever asked.
+import { language } from './i18n.js';
 import type { Assessment, ParameterInfo, Problem } from './types.js';
 
 /* What went wrong with a request: the daemon's own problem document, or status 0 when it could
@@ -28,7 +29,11 @@ async function problem_of(response: Response): Promise<Problem> {
 async function ask(path: string, accept: string, init: RequestInit = {}): Promise<Response> {
   let response: Response;
   try {
-    const headers = { Accept: accept, ...(init.headers as Record<string, string>) };
+    const headers = {
+      Accept: accept,
+      'Accept-Language': language() /* of a refusal, which is shown as it is */,
+      ...(init.headers as Record<string, string>),
+    };
     response = await fetch(path, { ...init, headers });
   } catch {
     throw new ApiError(0, {});
@@ -45,8 +50,10 @@ const assessment_path = (id: string): string => `/v1/assessments/${encodeURIComp
 
 export const events_path = (id: string): string => `${assessment_path(id)}/events`;
 export const field_path = (id: string): string => `${assessment_path(id)}/field.vtu`;
-export const section_path = (id: string): string => `${assessment_path(id)}/section.svg`;
-export const report_path = (id: string): string => `${assessment_path(id)}/report`;
+export const section_path = (id: string): string =>
+  `${assessment_path(id)}/section.svg?lang=${language()}`;
+export const report_path = (id: string): string =>
+  `${assessment_path(id)}/report?lang=${language()}`;
 export const document_path = assessment_path;
 
 interface ParametersDocument {

@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Words and numbers in the reader's language. Every string stands in lang/*.ts, one file a
-// language; the type of the English one makes the compiler find a missing string in the others.
-import { de } from './lang/de.js';
-import { en } from './lang/en.js';
-import { fr } from './lang/fr.js';
+// Words and numbers in the reader's language. Every string stands in words/, one file a language,
+// which the page shares with the daemon: keys that begin with "daemon." are not bundled here. The
+// type of the English one makes the compiler find a missing string in the others.
+import de from '../../words/de.json';
+import en from '../../words/en.json';
+import fr from '../../words/fr.json';
 
-export type Key = keyof typeof en;
-export type Strings = Record<Key, string>;
-/* A number's name and help are the daemon's own in English and translated here by its key. */
-export type Translation = Strings & { [key: `param.${string}`]: string };
-export type Language = 'en' | 'fr' | 'de';
+export type Key = Exclude<keyof typeof en, `daemon.${string}`>;
+export type Strings = Record<keyof typeof en, string>;
 
-const languages: Record<Language, Strings> = { en, fr, de };
-export const language_names: Record<Language, string> = {
-  en: 'English',
-  fr: 'Français',
-  de: 'Deutsch',
-};
+const languages = { en, de, fr } satisfies Record<string, Strings>;
+export type Language = keyof typeof languages;
+export const language_names = Object.fromEntries(
+  Object.entries(languages).map(([code, words]) => [code, words['language.name']]),
+) as Record<Language, string>;
 
 const storage_key = 'ischia.language';
 const is_language = (text: string | null | undefined): text is Language =>
-  text === 'en' || text === 'fr' || text === 'de';
+  typeof text === 'string' && Object.hasOwn(languages, text);
+
+/* What the address asks for, as the links of the page without JavaScript do. */
+const asked = (): string | null => new URLSearchParams(window.location.search).get('lang');
 
 function stored(): string | null {
   try {
@@ -32,7 +32,7 @@ function stored(): string | null {
 }
 
 function initial(): Language {
-  const wanted = [stored(), ...navigator.languages.map((l) => l.slice(0, 2))];
+  const wanted = [asked(), stored(), ...navigator.languages.map((l) => l.slice(0, 2))];
   return wanted.find(is_language) ?? 'en';
 }
 
@@ -46,6 +46,9 @@ export const language = (): Language => current;
 export function set_language(next: Language): void {
   current = next;
   document.documentElement.lang = next;
+  const address = new URL(window.location.href);
+  address.searchParams.delete('lang'); /* what is chosen now holds, also after a reload */
+  if (asked() !== null) history.replaceState(null, '', address);
   try {
     localStorage.setItem(storage_key, next);
   } catch {

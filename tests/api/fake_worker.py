@@ -156,7 +156,8 @@ def solve(frames, message):
 def render(frames, message):
     frames.blob()
     body = {
-        'svg': b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>\n',
+        'svg': b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1" xml:lang="%s"/>\n'
+        % message['lang'].encode(),
         'vtu': b'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid"/>\n',
     }[message['as']]
     frames.say({'say': 'rendered', 'job': message['job']})
@@ -168,7 +169,7 @@ def main():
     frames.say(
         {
             'say': 'hello',
-            'protocol': 1,
+            'protocol': 2,
             'program': 'fake',
             'model': 'macron2020-local',
             'model_version': 1,

@@ -482,7 +482,7 @@ class Routes(unittest.TestCase):
             'engineering',
             'section.svg',
             'animal',
-            'never compare',
+            'Never compare',
             'Tissue strain report \u00b7 left side',
             'First at (F = 331.5 N)',
             'Largest, under the bone',

@@ -107,26 +107,50 @@ test('numbers as people type them', async () => {
   assert.equal(difference(41.2, 10.1), 31.1);
 });
 
-test('every language has every string, with the same gaps to fill', async () => {
-  const names = (await readdir(join(source, 'src/lang'))).sort();
-  assert.deepEqual(names, ['de.ts', 'en.ts', 'fr.ts']);
-  const [{ de }, { en }, { fr }] = await Promise.all(names.map((n) => load(`src/lang/${n}`)));
-  const gaps = (text) => (text.match(/\{\w+\}/g) ?? []).sort();
-  /* English takes names and help of the numbers from the daemon; the others translate them. */
-  const of_parameters = parameters.parameters.flatMap(({ key }) => [
-    `param.${key}.name`,
-    `param.${key}.help`,
-  ]);
-  const own = (strings) => Object.keys(strings).filter((key) => !of_parameters.includes(key));
-  assert.deepEqual(own(en), Object.keys(en));
-  for (const other of [de, fr]) {
-    assert.deepEqual(own(other), Object.keys(en));
-    for (const key of of_parameters) assert.ok(other[key], key);
-    for (const key of Object.keys(en)) assert.deepEqual(gaps(other[key]), gaps(en[key]), key);
+const languages = (await readdir(join(source, '../words')))
+  .filter((f) => f.endsWith('.json'))
+  .map((f) => f.slice(0, -5));
+const words = Object.fromEntries(
+  await Promise.all(
+    languages.map(async (tag) => [
+      tag,
+      JSON.parse(await readFile(join(source, '../words', `${tag}.json`), 'utf8')),
+    ]),
+  ),
+);
+
+test('the page has the words of every language, and none of the daemon’s', async () => {
+  assert.deepEqual(languages.toSorted(), ['de', 'en', 'fr']);
+  const bundle = await readFile(join(dist, 'assets/app.js'), 'utf8');
+  for (const tag of languages) {
+    const all = Object.entries(words[tag]);
+    const of_the_page = all.filter(([key]) => !key.startsWith('daemon.')).map(([, text]) => text);
+    for (const [key, text] of all) {
+      if (/["'`\\\u007f-\uffff]/.test(text) || text.length < 20) continue; /* written otherwise */
+      const wanted = of_the_page.some((t) => t.includes(text));
+      assert.equal(bundle.includes(text), wanted, `${tag} ${key}`);
+    }
   }
 });
 
-/* Words between tags, or in an attribute that is read out, belong into lang/. */
+test('the page without JavaScript is there in every language, with no word left open', async () => {
+  for (const tag of languages) {
+    const html = await readFile(
+      join(dist, tag === 'en' ? 'index.html' : `index.${tag}.html`),
+      'utf8',
+    );
+    assert.ok(html.includes(`<html lang="${tag}">`), tag);
+    assert.ok(html.includes(`action="/v1/assessments?lang=${tag}"`), tag);
+    assert.doesNotMatch(html, /[{}]{2}|\{\w+\}/);
+    const { accepted } = parameters.parameters.find(({ key }) => key === 'muM');
+    const low = String(accepted.min).replace('.', words[tag]['number.decimal']);
+    assert.ok(html.includes(`${low} `), `${tag}: ${low}`);
+    assert.ok(html.includes(words[tag]['daemon.param.muM.name']), tag);
+    for (const other of languages) assert.ok(html.includes(`href="/?lang=${other}"`), other);
+  }
+});
+
+/* Words between tags, or in an attribute that is read out, belong into words/. */
 test('no text for people stands in the components', async () => {
   const folder = join(source, 'src');
   const files = (await readdir(folder, { recursive: true })).filter((f) => f.endsWith('.tsx'));

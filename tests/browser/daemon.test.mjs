@@ -186,12 +186,13 @@ test('without JavaScript: limits, a comma, a fault beside its field, then the re
   assert.equal(await plain.inputValue('#R1'), '7,1');
   await plain.fill('#R2', '22,8');
   await plain.click('button[type=submit]');
-  await plain.waitForURL(/\/v1\/assessments\/[^/]+\/report$/);
+  await plain.waitForURL(/\/v1\/assessments\/[^/]+\/report\?lang=en$/);
   const id = plain.url().split('/')[5];
   const { parameters, subject } = await (await fetch(`${origin}/v1/assessments/${id}`)).json();
   assert.deepEqual([parameters.R1, parameters.R2, subject], [7.1, 22.8, 'plain-1']);
   const wait = plain.getByRole('button', { name: 'Wait for the result' });
-  if (await wait.count()) await wait.click(); /* the same numbers may have been solved before */
+  if (await wait.count())
+    await wait.click({ timeout: solve_ms }); /* the same numbers may have been solved before */
   await plain
     .getByText('Muscle strain crosses both damage thresholds.')
     .waitFor({ timeout: solve_ms });
@@ -266,8 +267,130 @@ test('the report of the daemon is one A4 page and has all that a report must', a
   assert.match(paper.text[0], /Name, date, signature/);
 });
 
+const words = Object.fromEntries(
+  await Promise.all(
+    ['en', 'fr', 'de'].map(async (tag) => [
+      tag,
+      JSON.parse(await readFile(new URL(`../../words/${tag}.json`, import.meta.url), 'utf8')),
+    ]),
+  ),
+);
+
+/* Texts of a page that are English in a language that has other words for them. */
+const english_in = (text, tag) =>
+  Object.keys(words.en).filter(
+    (key) =>
+      words.en[key] !== words[tag][key] &&
+      words.en[key].length > 8 &&
+      !words.en[key].includes('{') &&
+      text.split('\n').some((line) => line.trim() === words.en[key]),
+  );
+
+for (const [tag, locale] of [
+  ['fr', 'fr-CA'],
+  ['de', 'de-CH'],
+]) {
+  test(`without JavaScript in ${tag}: the form, a fault, waiting, the report`, async () => {
+    const plain = await watched_page(browser, origin, { javaScriptEnabled: false, locale });
+    const word = (key) => words[tag][key];
+    await plain.goto(`${origin}/`);
+    assert.equal(await plain.locator('html').getAttribute('lang'), tag);
+    for (const { key, accepted, unit } of (await (await fetch(`${origin}/v1/parameters`)).json())
+      .parameters) {
+      const range = word('form.accepted')
+        .replace('{min}', String(accepted.min).replace('.', ','))
+        .replace('{max}', accepted.max)
+        .replace('{unit}', unit);
+      assert.equal(await plain.locator(`#${key}-range`).innerText(), range);
+      const label = await plain.locator(`label[for=${key}]`).innerText();
+      assert.ok(label.includes(word(`daemon.param.${key}.name`)), label);
+    }
+    assert.deepEqual(english_in(await plain.locator('body').innerText(), tag), []);
+    for (const [key, text] of Object.entries(sample.left)) await plain.fill(`#${key}`, text);
+    await plain.fill('#muM', '99,5');
+    await plain.click('button[type=submit]');
+    assert.equal(await plain.locator('html').getAttribute('lang'), tag);
+    const fault = await plain.locator('#muM-fault').innerText();
+    assert.match(fault, tag === 'fr' ? /99,5 kPa.*0,5 à 30 kPa/ : /99,5 kPa.*0,5 bis 30 kPa/);
+    await plain.fill('#muM', '8,0');
+    await plain.fill('#subject', `plain-${tag}`);
+    await plain.click('button[type=submit]');
+    await plain.waitForURL(/\/report\?lang=..$/);
+    const wait = plain.getByRole('button', { name: word('daemon.report.wait') });
+    if (await wait.count()) await wait.click({ timeout: solve_ms });
+    await plain.getByText(word('daemon.risk.both')).waitFor({ timeout: solve_ms });
+    assert.equal(await plain.locator('html').getAttribute('lang'), tag);
+    assert.deepEqual(english_in(await plain.locator('body').innerText(), tag), []);
+    await plain.getByRole('link', { name: 'English' }).click();
+    assert.equal(await plain.locator('html').getAttribute('lang'), 'en');
+    assert_clean(plain);
+    await plain.context().close();
+  });
+
+  test(`the report and the picture of the daemon in ${tag}: one page, accessible`, async () => {
+    await submit_sample();
+    await all_ended(2);
+    const id = new URL(page.url()).pathname.split('/')[2];
+    const { result } = await document_of(id);
+    await page.goto(`${origin}/v1/assessments/${id}/report?lang=${tag}`);
+    await page.locator('figure img').evaluate((image) => image.decode());
+    assert.equal(await page.locator('html').getAttribute('lang'), tag);
+    await assert_accessible(page, `the report in ${tag}`);
+    assert.deepEqual(await cut_off(page), []);
+    const { pages, is_a4, text } = await on_paper(page);
+    assert.deepEqual([pages, is_a4], [1, true]);
+    const comma = (number) => number.toFixed(3).replace('.', ',');
+    for (const part of [
+      words[tag]['report.title'],
+      `${comma(result.strain.eps_max)} ± ${comma(result.numerics.eps_max_error)}`,
+      words[tag]['daemon.section.heading'],
+      words[tag]['daemon.section.y0'],
+      words[tag]['drawing.seat'],
+      words[tag]['report.signature'],
+    ])
+      assert.ok(text[0].includes(part), part);
+    assert.match(text[0], /0,00\s+0,25[^]*2,00/); /* colour bar */
+    assert.deepEqual(english_in(text[0].replace(/ {2,}/g, '\n'), tag), []);
+    assert.doesNotMatch(text[0].replace(/^.*(Ischia|T\d\d:).*$/gm, ''), /\d\.\d/);
+    /* Everything outside the studied range: seven warnings more, and still one page. */
+    const odd = { R1: 10, R2: 70, eM: 41, eF: 36, muM: 9, muF: 9, F: 100, resolution: 'coarse' };
+    const answer = await fetch(`${origin}/v1/assessments`, {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/json', Prefer: 'wait=60' },
+      body: JSON.stringify({ ...odd, subject: 'x'.repeat(64), label: 'y'.repeat(200) }),
+    });
+    const { id: long } = await answer.json();
+    await page.goto(`${origin}/v1/assessments/${long}/report?lang=${tag}`);
+    await page.locator('li.warning').first().waitFor({ timeout: solve_ms });
+    assert.equal(await page.locator('li.warning').count(), 7);
+    assert.deepEqual(await cut_off(page), []);
+    assert.equal((await on_paper(page)).pages, 1);
+  });
+
+  test(`the page in ${tag} shows names, refusals and pictures in that language`, async () => {
+    const own = await watched_page(browser, origin, { locale });
+    await own.goto(`${origin}/`);
+    await own.locator('fieldset.side').first().waitFor();
+    assert.equal(await own.locator('html').getAttribute('lang'), tag);
+    await own.getByText(words[tag]['daemon.param.R1.name']).first().waitFor();
+    /* The names follow the language that is chosen. */
+    await own.selectOption('.language select', 'en');
+    await own.getByText(words.en['daemon.param.R1.name']).first().waitFor();
+    await own.selectOption('.language select', tag);
+    await own.getByText(words[tag]['daemon.param.R1.name']).first().waitFor();
+    const refusal = await own.evaluate(
+      async (language) =>
+        (await fetch('/v1/assessments/none', { headers: { 'Accept-Language': language } })).json(),
+      tag,
+    );
+    assert.equal(refusal.detail, words[tag]['daemon.refusal.no_assessment']);
+    assert_clean(own);
+    await own.context().close();
+  });
+}
+
 test('the other pages of the daemon are accessible too', async () => {
-  for (const path of ['/form', '/docs']) {
+  for (const path of ['/form', '/form?lang=fr', '/form?lang=de', '/docs']) {
     await page.goto(`${origin}${path}`, { waitUntil: 'networkidle' });
     await assert_accessible(page, path);
   }

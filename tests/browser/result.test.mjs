@@ -354,11 +354,14 @@ test('a phone shows everything without sideways scrolling', async () => {
   for (const address of [page.url(), `${s.origin}/`, `${s.origin}/assessments`]) {
     await page.goto(address);
     await page.locator('h1').waitFor();
-    const [content, view] = await page.evaluate(() => [
-      document.documentElement.scrollWidth,
-      window.innerWidth,
-    ]);
-    assert.ok(content <= view, `${address}: ${content} > ${view}`);
+    for (const tag of ['de', 'fr', 'en']) {
+      await page.selectOption('.language select', tag);
+      const [content, view] = await page.evaluate(() => [
+        document.documentElement.scrollWidth,
+        window.innerWidth,
+      ]);
+      assert.ok(content <= view, `${address} in ${tag}: ${content} > ${view}`);
+    }
     await assert_accessible(page, `${address} on a phone`);
   }
 });

@@ -63,6 +63,15 @@ export const parameters = {
   ],
 };
 
+/* The names as the daemon has them in each language: what the page shows can be told from them. */
+const parameters_in = (tag) =>
+  ['fr', 'de'].includes(tag)
+    ? {
+        ...parameters,
+        parameters: parameters.parameters.map((p) => ({ ...p, name: `${p.name} ${tag}` })),
+      }
+    : parameters;
+
 const cluster_set = (threshold, volume, F, tip) => ({
   ...(threshold ? { threshold } : {}),
   volume_mm3: volume,
@@ -271,14 +280,15 @@ export class StandIn {
     response.setHeader('Content-Security-Policy', csp);
     response.setHeader('X-Content-Type-Options', 'nosniff');
     const [, id, part] = /^\/v1\/assessments\/([^/]+)(?:\/(.+))?$/.exec(url.pathname) ?? [];
-    if (url.pathname === '/v1/parameters') return this.json(response, 200, parameters);
+    const tag = url.searchParams.get('lang') ?? request.headers['accept-language']?.slice(0, 2);
+    if (url.pathname === '/v1/parameters') return this.json(response, 200, parameters_in(tag));
     if (url.pathname === '/version')
       return this.json(response, 200, { program: 'stand-in', version: '0.0.0' });
     if (url.pathname === '/v1/assessments' && request.method === 'POST')
       return this.create(request, response);
     if (url.pathname === '/v1/assessments') return this.list(url, response);
     if (id) return this.one(id, part, response);
-    return this.file(url.pathname, response);
+    return this.file(url.pathname, tag, response);
   }
 
   json(response, status, body, headers = {}) {
@@ -391,7 +401,7 @@ export class StandIn {
     response.on('close', () => this.streams.delete(stream));
   }
 
-  async file(path, response) {
+  async file(path, tag, response) {
     const types = {
       '.html': 'text/html; charset=utf-8',
       '.js': 'text/javascript',
@@ -400,7 +410,8 @@ export class StandIn {
       '.txt': 'text/plain',
     };
     const page = path === '/' || /^\/assessments(\/|$)/.test(path);
-    const name = page ? 'index.html' : normalize(path).replace(/^(\.\.)+/, '');
+    const index = ['fr', 'de'].includes(tag) ? `index.${tag}.html` : 'index.html';
+    const name = page ? index : normalize(path).replace(/^(\.\.)+/, '');
     try {
       const bytes = await readFile(join(this.dist, name));
       response.writeHead(200, {

@@ -292,8 +292,8 @@ static void draw(struct fake *fake, struct frame_reader *reader)
     char drawing[256];
     require(frame_receive(reader, fake->fd, &field, NULL) == ISCHIA_OK);
     require(field.kind == FRAME_BLOB && field.size < 200);
-    const int size =
-        snprintf(drawing, sizeof drawing, "%s:%.*s", fake->order.as, (int)field.size, field.bytes);
+    const int size = snprintf(drawing, sizeof drawing, "%s-%s:%.*s", fake->order.as,
+                              fake->order.language, (int)field.size, field.bytes);
     if (json_member(fake->given, "do") != NULL) {
         act(fake);
         return;

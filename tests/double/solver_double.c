@@ -134,11 +134,11 @@ enum ischia_code ischia_write_vtu(FILE *out, const struct ischia_case *c,
     return write_words(out, "<VTKFile/>\n", err);
 }
 
-enum ischia_code ischia_write_section_svg(FILE *out, const struct ischia_case *c,
-                                          const struct ischia_field *field,
-                                          struct ischia_error *err)
+enum ischia_code
+ischia_write_section_svg(FILE *out, const struct ischia_case *c, const struct ischia_field *field,
+                         const struct ischia_section_labels *labels, struct ischia_error *err)
 {
-    (void)c, (void)field;
+    (void)c, (void)field, (void)labels;
     return write_words(out, "<svg/>\n", err);
 }
 

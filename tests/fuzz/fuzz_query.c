@@ -15,6 +15,8 @@ static void read_headers(const char *text)
     char word[64];
     const int wait = query_prefer_wait(text, 60);
     MUST(wait >= -1 && wait <= 60);
+    const int language = query_language(text, types);
+    MUST(language >= 0 && language < 2);
     const int chosen = query_accept(text, types);
     MUST(chosen >= -1 && chosen <= 1);
     (void)gzip_accepted(text);

@@ -6,6 +6,7 @@ from pathlib import PurePosixPath
 
 import layers
 from source import Finding, Nesting, ROOMS, line_of
+from words_rules import WORDS_RULES
 
 FUNCTION_LINES_MAX = 100
 FUNCTION_LINES_P90 = 40
@@ -330,3 +331,6 @@ def foreign_headers_are_documented(tree):
         header, home = found[1], layers.home_of(found[1])
         if home and (header.split("/")[0] not in text or home.rsplit("/", 1)[1] not in text):
             yield Finding(page, 1, f"does not say that {home} alone sees {header}")
+
+
+RULES.extend(WORDS_RULES)

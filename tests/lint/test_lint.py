@@ -13,7 +13,15 @@ from source import Nesting, Tree  # noqa: E402
 
 SPDX = "/* SPDX-License-Identifier: GPL-3.0-or-later */\n"
 BODY = "int f(void) { return 0; }\n"
+FILL = """void f(double upto)
+{
+    fill(WORD_A_B, WORDS(word_number("from", 1, 6), word_number("upto", upto, 6)));
+}
+"""
 CLEAN = {
+    "words/en.json": '{"a.b": "{from} to {upto}"}\n',
+    "words/fr.json": '{"a.b": "{from} à {upto}"}\n',
+    "api/risk.c": SPDX + FILL,
     "solver/case.c": SPDX + '#include "solver/case.h"\n\n#include <math.h>\n\n' + BODY,
     "solver/case.h": SPDX + "/* Always 0. */\nint f(void);\n",
     "solver/linear.c": SPDX + "#include <cholmod.h>\n",
@@ -77,6 +85,15 @@ PLANTED = {
         {"run.sh": "#!/bin/bash\n# SPDX-License-Identifier: GPL-3.0-or-later\ntrue\n"},
     "foreign_headers_are_documented":
         {"docs/ARCHITECTURE.md": "See `solver/case.h`.\n"},
+    "languages_say_the_same":
+        {"words/fr.json": '{"a.b": "de {from} à {to}"}\n'},
+    "every_word_is_used":
+        {"words/en.json": '{"a.b": "{from} to {upto}", "c.d": "nobody"}\n',
+         "words/fr.json": '{"a.b": "{from} à {upto}", "c.d": "personne"}\n'},
+    "words_get_the_values_that_they_name":
+        {"api/risk.c": SPDX + FILL.replace('"upto"', '"to"')},
+    "what_people_read_stands_in_words":
+        {"server/http/page.c": SPDX + "const char *f(void) { return \"<p>Be patient\"; }\n"},
 }
 
 

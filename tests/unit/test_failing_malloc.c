@@ -95,7 +95,7 @@ static enum ischia_code write_assessment(void)
 
 static enum ischia_code write_parameters(void)
 {
-    return free_text(parameters_doc_text(&text, 2, &err));
+    return free_text(parameters_doc_text(&text, LANGUAGE_EN, 2, &err));
 }
 
 static void survive(enum ischia_code (*call)(void), long at_least)

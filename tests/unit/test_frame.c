@@ -178,6 +178,7 @@ static void expect_round_trip(struct message message)
     assert_true(back.fraction <= message.fraction && back.fraction >= message.fraction);
     assert_string_equal(back.text, message.text);
     assert_string_equal(back.as, message.as);
+    assert_string_equal(back.language, message.language);
     assert_string_equal(back.model, message.model);
     if (message.case_json != NULL) assert_string_equal(back.case_json, message.case_json);
     free(back.case_json);
@@ -195,8 +196,8 @@ static void test_messages_come_back_as_they_were(void **state)
     expect_round_trip((struct message){.kind = MESSAGE_PROBLEM, .job = 1});
     expect_round_trip((struct message){.kind = MESSAGE_RENDERED, .job = 1});
     expect_round_trip((struct message){.kind = MESSAGE_SOLVE, .job = 1, .case_json = case_json});
-    expect_round_trip(
-        (struct message){.kind = MESSAGE_RENDER, .job = 1, .as = "svg", .case_json = case_json});
+    expect_round_trip((struct message){
+        .kind = MESSAGE_RENDER, .job = 1, .as = "svg", .language = "fr", .case_json = case_json});
 }
 
 static void test_bad_messages_are_refused(void **state)

@@ -19,6 +19,7 @@
 #include "solver/section_svg.h"
 #include "solver/vtu.h"
 #include "tests/unit/box_mesh.h"
+#include "tests/unit/labels.h"
 
 enum { NEVER = -1, ALLOCATIONS_MAX = 100 };
 
@@ -83,7 +84,7 @@ static enum ischia_code vtu(struct world *w, struct ischia_error *err)
 
 static enum ischia_code section(struct world *w, struct ischia_error *err)
 {
-    return section_svg_write(w->out, &w->c, &w->mesh, w->u, err);
+    return section_svg_write(w->out, &w->c, &w->mesh, w->u, &labels, err);
 }
 
 static enum ischia_code deck(struct world *w, struct ischia_error *err)

@@ -13,7 +13,7 @@ static int set_up(void **state)
     char *text;
     (void)state;
     doc_faults_init(&faults);
-    if (parameters_doc_text(&text, 2, &err) != ISCHIA_OK) return -1;
+    if (parameters_doc_text(&text, LANGUAGE_EN, 2, &err) != ISCHIA_OK) return -1;
     const enum ischia_code code =
         json_parse(&root, text, strlen(text), &json_limits_stored, &faults, &err);
     free(text);

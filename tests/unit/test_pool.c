@@ -415,7 +415,7 @@ static void ask_drawing(struct host *host, const char *case_json)
 {
     struct ischia_error err = {0};
     const enum ischia_code code =
-        pool_render(host->pool, POOL_RENDER_SVG, case_json, (const unsigned char *)"bytes", 5,
+        pool_render(host->pool, POOL_RENDER_SVG, "fr", case_json, (const unsigned char *)"bytes", 5,
                     on_drawing, host, &err);
     if (code != ISCHIA_OK) fail_msg("%s", err.message);
 }
@@ -433,7 +433,7 @@ static void test_drawings_do_not_wait_for_solves(void **state)
     ask_drawing(&host, "{\"do\":\"diverge\"}");
     await(&host, &host.drawings, 3);
     assert_int_equal(host.drawing_code[0], ISCHIA_OK);
-    assert_string_equal(host.drawing[0], "svg:bytes");
+    assert_string_equal(host.drawing[0], "svg-fr:bytes");
     assert_int_equal(host.drawing_code[1], ISCHIA_E_IO);
     assert_int_equal(host.drawing_code[2], ISCHIA_E_INPUT);
     ask_drawing(&host, "{}");
@@ -458,14 +458,14 @@ static void test_drawings_are_limited(void **state)
     ask_drawing(&host, "{}");
     struct ischia_error err;
     assert_int_equal(
-        pool_render(host.pool, POOL_RENDER_VTU, "{}", NULL, 0, on_drawing, &host, &err),
+        pool_render(host.pool, POOL_RENDER_VTU, "en", "{}", NULL, 0, on_drawing, &host, &err),
         ISCHIA_E_LIMIT);
     await(&host, &host.drawings, 2);
     assert_int_equal(host.drawing_code[0], ISCHIA_E_LIMIT);
     assert_int_equal(host.drawing_code[1], ISCHIA_OK);
     pool_drain(host.pool);
     assert_int_equal(
-        pool_render(host.pool, POOL_RENDER_VTU, "{}", NULL, 0, on_drawing, &host, &err),
+        pool_render(host.pool, POOL_RENDER_VTU, "en", "{}", NULL, 0, on_drawing, &host, &err),
         ISCHIA_E_STATE);
     stop(&host);
 }

@@ -100,6 +100,33 @@ static void accept_chooses(void **state)
     assert_false(query_media_type_is("application/jsonp", "application/json"));
 }
 
+static void the_language_that_is_liked_best(void **state)
+{
+    (void)state;
+    static const char *const tags[] = {"en", "de", "fr", NULL};
+    static const struct {
+        const char *header;
+        int wanted;
+    } cases[] = {
+        {"", 0},
+        {"it", 0},
+        {"fr", 2},
+        {"FR-ca", 2},
+        {"frr, fra", 0},
+        {"de;q=0.5, fr;q=0.8", 2},
+        {"de-CH;q=0.9,de;q=0.1,fr;q=0.5", 1},
+        {"en-GB, de;q=0.9", 0},
+        {"*", 0},
+        {"en;q=0, *;q=0.1", 1},
+        {"de;q=0", 0},
+        {"*;q=nan, fr;q=0.1", 2},
+        {",;,-, fr", 2},
+    };
+    assert_int_equal(query_language(NULL, tags), 0);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        assert_int_equal(query_language(cases[i].header, tags), cases[i].wanted);
+}
+
 static void tags_match_weakly(void **state)
 {
     (void)state;
@@ -158,6 +185,7 @@ int main(void)
         cmocka_unit_test(escapes_are_undone_or_refused),
         cmocka_unit_test(a_parameter_is_found_once),
         cmocka_unit_test(strangers_are_named),
+        cmocka_unit_test(the_language_that_is_liked_best),
         cmocka_unit_test(whole_numbers_only),
         cmocka_unit_test(prefer_wait_is_read),
         cmocka_unit_test(accept_chooses),

@@ -13,6 +13,7 @@
 #include "solver/section.h"
 #include "solver/section_svg.h"
 #include "tests/unit/box_mesh.h"
+#include "tests/unit/labels.h"
 
 static const struct box box = {{3, 2, 5}, {6, 8, 10}, 1, 1};
 
@@ -159,7 +160,7 @@ static char *draw(void)
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     assert_non_null(out);
-    assert_int_equal(section_svg_write(out, &c, &mesh, u, NULL), ISCHIA_OK);
+    assert_int_equal(section_svg_write(out, &c, &mesh, u, &labels, NULL), ISCHIA_OK);
     assert_int_equal(fclose(out), 0);
     assert_int_equal(strlen(text), size);
     free(u);
@@ -196,13 +197,18 @@ static void the_drawing_is_whole_and_says_what_it_shows(void **state)
         "<title id=\"title\">",
         "<desc id=\"desc\">",
         "role=\"img\"",
-        "section y = 0",
-        "section x = 0",
+        ">plan y<",
+        ">plan x<",
         "10 mm",
-        "Green–Lagrange",
+        "tøyning",
+        ">&lt;titel> &amp; co<",
+        "xml:lang=\"x-test\"",
+        "R1 6,9 mm",
         "muM 8 kPa",
         "F 196 N",
-        ">0.75<",
+        ">0,75<",
+        ">= 0,75<",
+        ">sete<",
         "id=\"half1-0\"",
     };
     static const char *const unwanted[] = {"nan", "inf", "-0.00 ", " -0.00", "e+", "e-0"};
@@ -235,7 +241,7 @@ static void a_full_disk_is_an_error(void **state)
     double *u = box_alloc((size_t)mesh.node_count * 3, sizeof *u);
     FILE *full = fopen("/dev/full", "w");
     assert_non_null(full);
-    assert_int_equal(section_svg_write(full, &c, &mesh, u, &err), ISCHIA_E_IO);
+    assert_int_equal(section_svg_write(full, &c, &mesh, u, &labels, &err), ISCHIA_E_IO);
     (void)fclose(full);
     free(u);
     box_mesh_free(&mesh);

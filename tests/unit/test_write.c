@@ -12,6 +12,7 @@
 
 #include "solver/mesh.h"
 #include "solver/solver.h"
+#include "tests/unit/labels.h"
 
 /* Row 1R of Table 2, coarse. */
 static struct ischia_case row_1R(void)
@@ -72,7 +73,7 @@ static void the_field_is_written_on_the_mesh_of_its_case(void **state)
     assert_non_null(strstr(page_text(&page), points));
     page_close(&page);
     page_open(&page);
-    assert_int_equal(ischia_write_section_svg(page.out, &c, &field, NULL), ISCHIA_OK);
+    assert_int_equal(ischia_write_section_svg(page.out, &c, &field, &labels, NULL), ISCHIA_OK);
     assert_non_null(strstr(page_text(&page), "</svg>"));
     page_close(&page);
     free(field.displacement_mm);
@@ -89,7 +90,7 @@ static void a_field_of_another_case_is_refused(void **state)
     page_open(&page);
     assert_int_equal(ischia_write_vtu(page.out, &c, &field, &err), ISCHIA_E_INPUT);
     assert_non_null(strstr(err.message, "nodes"));
-    assert_int_equal(ischia_write_section_svg(page.out, &c, &field, &err), ISCHIA_E_INPUT);
+    assert_int_equal(ischia_write_section_svg(page.out, &c, &field, &labels, &err), ISCHIA_E_INPUT);
     assert_int_equal(strlen(page_text(&page)), 0);
     page_close(&page);
     free(field.displacement_mm);
@@ -104,7 +105,7 @@ static void a_field_with_a_hole_is_refused(void **state)
     struct page page;
     field.displacement_mm[3 * 17 + 1] = (double)NAN;
     page_open(&page);
-    assert_int_equal(ischia_write_section_svg(page.out, &c, &field, &err), ISCHIA_E_INPUT);
+    assert_int_equal(ischia_write_section_svg(page.out, &c, &field, &labels, &err), ISCHIA_E_INPUT);
     assert_non_null(strstr(err.message, "node 17"));
     page_close(&page);
     free(field.displacement_mm);

@@ -3,7 +3,7 @@
 // One measured number: label, input, unit, accepted range, help, what was understood, what is wrong.
 import type { ComponentChildren } from 'preact';
 import { useState } from 'preact/hooks';
-import { format, t, t_or } from '../i18n.js';
+import { format, t } from '../i18n.js';
 import { Shape } from '../ui.js';
 import type { ParameterInfo, Side } from '../types.js';
 import type { Finding } from './model.js';
@@ -25,9 +25,6 @@ export interface FieldProps {
 
 export const field_id = (side: Side, key: string): string => `${side}-${key}`;
 
-export const param_name = (info: ParameterInfo): string =>
-  t_or(`param.${info.key}.name`, info.name);
-
 export function Symbol_(props: { of: string }) {
   const symbols: Record<string, [string, string]> = {
     R1: ['R', '1'],
@@ -48,7 +45,7 @@ export function Symbol_(props: { of: string }) {
 
 function Help(props: { info: ParameterInfo; more: string; id: string; side: Side }) {
   const [open, set_open] = useState(false);
-  const name = param_name(props.info);
+  const name = props.info.name;
   return (
     <span class="help" onKeyDown={(e) => e.key === 'Escape' && set_open(false)}>
       <button
@@ -63,7 +60,7 @@ function Help(props: { info: ParameterInfo; more: string; id: string; side: Side
         ?
       </button>
       <span id={props.id} class="help-text" hidden={!open}>
-        {`${t_or(`param.${props.info.key}.help`, props.info.description)} ${props.more}`.trim()}
+        {`${props.info.description} ${props.more}`.trim()}
       </span>
     </span>
   );
@@ -100,7 +97,7 @@ export function Field(props: FieldProps) {
   return (
     <div class="field">
       <label for={id}>
-        <Symbol_ of={info.key} /> {props.label ?? param_name(info)}
+        <Symbol_ of={info.key} /> {props.label ?? info.name}
       </label>
       <Help info={info} more={props.more_help ?? ''} id={`${id}-help`} side={side} />
       <span class="entry">

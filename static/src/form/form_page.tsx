@@ -3,7 +3,7 @@
 // The form: a person, two sides, one button.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { get_parameters, type Parameters } from '../api.js';
-import { t } from '../i18n.js';
+import { language, t } from '../i18n.js';
 import type { Side } from '../types.js';
 import { field_id } from './field.js';
 import { sides } from './model.js';
@@ -50,7 +50,7 @@ function use_parameters(): [Parameters | null, boolean, () => void] {
     set_failed(false);
     get_parameters().then(set, () => set_failed(true));
   };
-  useEffect(load, []);
+  useEffect(load, [language()]); /* names and helps are the daemon's, in the reader's language */
   return [parameters, failed, load];
 }
 

@@ -5,7 +5,7 @@
 import { useEffect, useState } from 'preact/hooks';
 import { get_version, section_path, type Parameters } from '../api.js';
 import { format, format_fixed, format_percent, format_time, t } from '../i18n.js';
-import { param_name, Symbol_ } from '../form/field.js';
+import { Symbol_ } from '../form/field.js';
 import { general_caveats, warning_text } from '../result/caveats.js';
 import { share_of_muscle, tip_height, type Finished } from '../result/quantities.js';
 import type { ClusterSet } from '../types.js';
@@ -18,7 +18,7 @@ function Inputs(props: { of: Finished; parameters: Parameters }) {
       <tbody>
         {props.parameters.inputs.map((info) => (
           <tr key={info.key}>
-            <th scope="row">{param_name(info)}</th>
+            <th scope="row">{info.name}</th>
             <td>
               <Symbol_ of={info.key} />
             </td>

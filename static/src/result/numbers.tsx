@@ -2,7 +2,7 @@
 //
 // Everything entered and computed, one column an assessment, and the difference of two.
 import { format, format_fixed, format_signed, t } from '../i18n.js';
-import { param_name, Symbol_ } from '../form/field.js';
+import { Symbol_ } from '../form/field.js';
 import type { Assessment, ParameterInfo, Result } from '../types.js';
 import { column_names } from '../ui.js';
 import { quantities, quantity_name, type Finished, type Quantity } from './quantities.js';
@@ -30,7 +30,7 @@ function InputRows(props: { documents: Assessment[]; inputs: ParameterInfo[] }) 
         return (
           <tr key={info.key}>
             <th scope="row">
-              <Symbol_ of={info.key} /> {param_name(info)}
+              <Symbol_ of={info.key} /> {info.name}
             </th>
             {values.map((v, i) => (
               <td key={i}>{v === undefined ? '–' : format(v) + unit_suffix(info.unit)}</td>

@@ -11,7 +11,7 @@ import {
   type Parameters,
 } from '../api.js';
 import { Follower, has_ended, type Followed } from '../follow.js';
-import { format_time, t, t_or } from '../i18n.js';
+import { format_time, language, t, t_or } from '../i18n.js';
 import { form_address } from '../router.js';
 import { Reports } from '../report/report.js';
 import type { Assessment } from '../types.js';
@@ -47,7 +47,7 @@ function use_parameters(): Parameters | null {
   const [parameters, set] = useState<Parameters | null>(null);
   useEffect(() => {
     get_parameters().then(set, () => undefined /* names and limits are then left out */);
-  }, []);
+  }, [language()]);
   return parameters;
 }
 
