@@ -127,12 +127,13 @@ static void read_member(struct case_doc_fields *fields, const struct json *membe
     }
 }
 
-void case_doc_read_value(struct ischia_request *ret, const struct json *value,
-                         struct doc_faults *faults)
+void case_doc_read_value_over(struct ischia_request *ret, const struct case_doc_defaults *defaults,
+                              const struct json *value, struct doc_faults *faults)
 {
     struct case_doc_fields fields;
     case_doc_fields_init(&fields, ret, faults);
-    if (json_type_of(value) != JSON_OBJECT) {
+    case_doc_fields_set_defaults(&fields, defaults);
+    if (value != NULL && json_type_of(value) != JSON_OBJECT) {
         doc_faults_say(faults, "", "wrong_type", WORD_DAEMON_FAULT_DOCUMENT,
                        WORDS(word_text(
                            "given", words_get(faults->language, type_words[json_type_of(value)]))));
@@ -141,6 +142,12 @@ void case_doc_read_value(struct ischia_request *ret, const struct json *value,
     for (const struct json *m = json_first(value); m != NULL; m = json_next(m))
         read_member(&fields, m);
     case_doc_fields_end(&fields);
+}
+
+void case_doc_read_value(struct ischia_request *ret, const struct json *value,
+                         struct doc_faults *faults)
+{
+    case_doc_read_value_over(ret, &(struct case_doc_defaults){NULL, NULL}, value, faults);
 }
 
 enum ischia_code case_doc_read(struct ischia_request *ret, const char *json, size_t length,

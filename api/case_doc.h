@@ -52,6 +52,16 @@ ISCHIA_MUST_CHECK enum ischia_code case_doc_read(struct ischia_request *ret, con
 void case_doc_read_value(struct ischia_request *ret, const struct json *value,
                          struct doc_faults *faults);
 
+/* What holds for many cases at once, unless one says otherwise; NULL: the usual default. */
+struct case_doc_defaults {
+    const char *resolution;
+    const char *model; /* name of a set of options */
+};
+/* The same over such defaults; a value that names what they name is a fault ("duplicate"). value
+ * NULL: an empty object. */
+void case_doc_read_value_over(struct ischia_request *ret, const struct case_doc_defaults *defaults,
+                              const struct json *value, struct doc_faults *faults);
+
 /*
  * application/x-www-form-urlencoded. Keys as in JSON; options of the groups as "skin.mu" and
  * "model.friction"; a number may be typed as people type it, with a decimal comma or point (see
@@ -76,6 +86,8 @@ struct case_doc_fields {
 void case_doc_fields_init(struct case_doc_fields *ret, struct ischia_request *request,
                           struct doc_faults *faults); /* not typed */
 void case_doc_fields_set(struct case_doc_fields *fields, const char *key, const char *value);
+void case_doc_fields_set_defaults(struct case_doc_fields *fields,
+                                  const struct case_doc_defaults *defaults);
 void case_doc_fields_end(struct case_doc_fields *fields); /* options, limits, what is missing */
 
 /* The canonical spelling of a key that fields_set knows ("muM" for U+00B5 M, "skin.mu"), static;

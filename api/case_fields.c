@@ -411,6 +411,14 @@ void case_doc_fields_set(struct case_doc_fields *fields, const char *key, const 
     set_trimmed(fields, found, trimmed);
 }
 
+void case_doc_fields_set_defaults(struct case_doc_fields *fields,
+                                  const struct case_doc_defaults *defaults)
+{
+    if (defaults->resolution != NULL)
+        case_doc_fields_set(fields, "resolution", defaults->resolution);
+    if (defaults->model != NULL) case_doc_fields_set(fields, "model", defaults->model);
+}
+
 void case_doc_fields_end(struct case_doc_fields *fields)
 {
     double *option = fields->request->values.option;

@@ -87,7 +87,8 @@ static void write_preset_group(struct json_out *out, const char *group,
     json_close_object(out);
 }
 
-static const enum word preset_words[] = {WORD_DAEMON_PRESET_DEFAULT}; /* of ischia_presets */
+static const enum word preset_words[] = {WORD_DAEMON_PRESET_DEFAULT,
+                                         WORD_DAEMON_PRESET_PUBLISHED}; /* of ischia_presets */
 
 static void write_presets(struct json_out *out, enum language language)
 {

@@ -50,6 +50,12 @@ const struct config_option config_options[] = {
            "Time that one solve may take before its worker is ended."),
     NUMBER("queue_limit", queue_limit, "assessments", 1, 10000000, "20000", true,
            "Waiting assessments above which new ones are answered 429."),
+    NUMBER("study_limit", study_limit, "points", 1, 1000000, "10000", false,
+           "Points that one study may have, and waiting points of all studies above which new "
+           "ones are answered 429."),
+    TEXT(emulator, "",
+         "File with a trained emulator, as emulator/train.py writes it, for estimates; empty: "
+         "none, and no estimates."),
     NUMBER("retention_days", retention_days, "d", 0, 36500, "0", true,
            "Age after which finished assessments are erased; 0: never."),
     NUMBER("retention_count", retention_count, "assessments", 0, INT_MAX, "0", true,

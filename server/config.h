@@ -59,7 +59,8 @@ struct config {
     int workers;
     int worker_memory_mib;
     int worker_time_s;
-    int queue_limit;
+    int queue_limit, study_limit;
+    char emulator[CONFIG_TEXT_BYTES];
     int retention_days;
     int retention_count;
     int idempotency_hours;

@@ -33,3 +33,8 @@ void digest_hex(const unsigned char digest[DIGEST_BYTES], char ret_hex[DIGEST_HE
     }
     ret_hex[2 * DIGEST_BYTES] = '\0';
 }
+
+void digest_plain(const void *bytes, size_t size, unsigned char ret_digest[DIGEST_BYTES])
+{
+    (void)crypto_hash_sha256(ret_digest, bytes, size);
+}

@@ -20,6 +20,9 @@ struct digest_part digest_text(const char *text);
 void digest_parts(const struct digest_part *parts, size_t count,
                   unsigned char ret_digest[DIGEST_BYTES]);
 
+/* SHA-256 of the bytes alone, as sha256sum prints it. */
+void digest_plain(const void *bytes, size_t size, unsigned char ret_digest[DIGEST_BYTES]);
+
 /* Lower-case hexadecimal. */
 void digest_hex(const unsigned char digest[DIGEST_BYTES], char ret_hex[DIGEST_HEX_BYTES]);
 

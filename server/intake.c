@@ -42,8 +42,7 @@ void intake_subject(const struct origin *origin, char ret[ISCHIA_SUBJECT_BYTES])
 
 /* -------------------------------------------------------------------------------- intake */
 
-/* What a worker is given, and what makes two requests the same: nothing about the person. */
-static enum ischia_code case_text(const struct ischia_request *request, char **ret,
+enum ischia_code intake_case_text(const struct ischia_request *request, char **ret,
                                   struct ischia_error *err)
 {
     struct ischia_request bare = *request;
@@ -100,7 +99,7 @@ enum ischia_code intake_init(struct intake *ret, const struct ischia_request *re
     ret->request = *request;
     if (origin != NULL) ret->origin = *origin;
     if (ret->request.subject[0] == '\0') intake_subject(&ret->origin, ret->request.subject);
-    enum ischia_code code = case_text(&ret->request, &ret->case_json, err);
+    enum ischia_code code = intake_case_text(&ret->request, &ret->case_json, err);
     if (code == ISCHIA_OK) code = warnings_text(&ret->request, &ret->warnings_json, err);
     if (code == ISCHIA_OK && origin_is_given(&ret->origin))
         code = origin_text(&ret->origin_json, &ret->origin, err);

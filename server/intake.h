@@ -24,6 +24,11 @@ intake_init(struct intake *ret, const struct ischia_request *request, const stru
             struct ischia_error *err);
 void intake_finish(struct intake *intake);
 
+/* What a worker is given, and what makes two requests the same: nothing about the person. *ret is
+ * the caller's to free. */
+ISCHIA_MUST_CHECK enum ischia_code intake_case_text(const struct ischia_request *request,
+                                                    char **ret, struct ischia_error *err);
+
 /*
  * The pseudonymous subject of a person: the id of "Patient/ID" and the id of a PID-3 that names no
  * authority, as they are; any other reference, identifier or PID-3 as "x-" and 32 digits of its

@@ -244,6 +244,8 @@ static enum ischia_code create_parts(struct daemon *d, struct ischia_error *err)
     TRY(auth_create(&s->auth, s->store, err));
     TRY(audit_create(&s->audit, s->store, err));
     TRY(rate_create(&s->rate, err));
+    if (s->config.emulator[0] != '\0')
+        TRY(estimator_create(&s->estimator, s->config.emulator, err));
     if (s->config.cds_issuers[0] != '\0') TRY(trust_create(&s->trust, s->config.cds_issuers, err));
     return documents_create(&s->documents, err);
 }
@@ -305,6 +307,14 @@ static void on_finished(void *context, const struct uuid *id, enum queue_state s
              log_quote(&quoted, detail == NULL ? "" : detail));
 }
 
+static void on_point(void *context, enum queue_state state, enum pool_end end, int64_t wall_ms)
+{
+    (void)context;
+    LOG_DEBUG("point of a study ended", "status=%s end=%s wall_ms=%lld", queue_state_names[state],
+              pool_end_names[end], (long long)wall_ms);
+    if (queue_is_final(state)) metrics_count(METRIC_STUDY_POINTS);
+}
+
 static void on_store_error(void *context, const struct ischia_error *err)
 {
     struct log_value message;
@@ -323,7 +333,7 @@ static enum ischia_code start_queue(struct daemon *d, struct ischia_error *err)
                  .solve_deadline_ms = config->worker_time_s * 1000},
         .queued_max = config->queue_limit,
     };
-    const struct queue_watcher watcher = {d, on_note, on_finished, on_store_error};
+    const struct queue_watcher watcher = {d, on_note, on_finished, on_point, on_store_error};
     return queue_create(d->service.store, d->service.events, &options, &watcher, &d->service.queue,
                         err);
 }
@@ -467,6 +477,7 @@ static void reload(struct daemon *d)
 /* Erases what the retention rule no longer keeps, a batch at a time so that nobody waits long. */
 static void retire(struct daemon *d)
 {
+    bool study = false;
     const struct config *config = &d->service.config;
     const struct store_retention rule = {
         .age_max_ms = (int64_t)config->retention_days * 24 * 3600 * 1000,
@@ -476,8 +487,11 @@ static void retire(struct daemon *d)
     int erased = 0;
     if (store_retire(d->service.store, &rule, RETIRE_BATCH, &erased, &err) != ISCHIA_OK)
         on_store_error(d, &err);
-    if (erased > 0) LOG_INFO("retention", "erased=%d", erased);
-    d->retire_at_ms = http_now_ms() + (erased == RETIRE_BATCH ? TICK_MS : RETIRE_EVERY_S * 1000);
+    if (store_study_retire(d->service.store, rule.age_max_ms, &study, &err) != ISCHIA_OK)
+        on_store_error(d, &err);
+    if (erased > 0 || study) LOG_INFO("retention", "erased=%d studies=%d", erased, study);
+    d->retire_at_ms =
+        http_now_ms() + (erased == RETIRE_BATCH || study ? TICK_MS : RETIRE_EVERY_S * 1000);
 }
 
 static void tick(struct daemon *d)
@@ -560,6 +574,7 @@ static void finish(struct daemon *d)
     events_destroy(s->events);
     documents_destroy(s->documents);
     trust_destroy(s->trust);
+    estimator_destroy(s->estimator);
     rate_destroy(s->rate);
     audit_destroy(s->audit);
     auth_destroy(s->auth);

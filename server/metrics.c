@@ -31,6 +31,9 @@ static const struct metric_info counter_info[METRIC_COUNTER_COUNT] = {
                                "Requests with a foreign Host or Origin."},
     [METRIC_SLOW_CLIENTS] = {"ischia_slow_clients_total",
                              "Connections closed because a request did not arrive in time."},
+    [METRIC_STUDY_POINTS] = {"ischia_study_points_total", "Points of studies that have ended."},
+    [METRIC_STUDY_YIELDS] = {"ischia_study_yields_total",
+                             "Solves of studies that were stopped to make room for a request."},
 };
 
 static const struct metric_info gauge_info[METRIC_GAUGE_COUNT] = {
@@ -43,6 +46,8 @@ static const struct metric_info gauge_info[METRIC_GAUGE_COUNT] = {
     [METRIC_STORE_BYTES] = {"ischia_store_bytes", "Size of the store's files."},
     [METRIC_CONNECTIONS] = {"ischia_http_connections", "Connections open."},
     [METRIC_EVENT_STREAMS] = {"ischia_http_event_streams", "Event streams open."},
+    [METRIC_STUDY_POINTS_WAITING] = {"ischia_study_points_waiting",
+                                     "Points of studies that wait for a worker."},
 };
 
 static const double solve_bounds[] = {0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64, 128, 256};

@@ -43,6 +43,7 @@ struct pool {
     struct pool_stats stats;
 
     bool may_have_job; /* the thread's own: ask the host when a worker is idle */
+    bool may_press;    /* likewise: ask the host whether a job that yields must go */
     int64_t next_tick_ms;
 };
 
@@ -114,7 +115,7 @@ static const enum pool_end end_of[] = {
     [KILLED_NOT] = POOL_CRASHED,       [KILLED_CANCEL] = POOL_CANCELLED,
     [KILLED_DEADLINE] = POOL_DEADLINE, [KILLED_PROTOCOL] = POOL_CRASHED,
     [KILLED_DRAIN] = POOL_DRAINED,     [KILLED_IDLE] = POOL_CRASHED,
-    [KILLED_VERSION] = POOL_CRASHED,
+    [KILLED_YIELD] = POOL_YIELDED,     [KILLED_VERSION] = POOL_CRASHED,
 };
 
 static void end_job_of_dead(struct pool *pool, struct worker *worker, const char *words)
@@ -130,7 +131,7 @@ static void end_job_of_dead(struct pool *pool, struct worker *worker, const char
         [KILLED_NOT] = ISCHIA_E_IO,         [KILLED_CANCEL] = ISCHIA_E_IO,
         [KILLED_DEADLINE] = ISCHIA_E_LIMIT, [KILLED_PROTOCOL] = ISCHIA_E_IO,
         [KILLED_DRAIN] = ISCHIA_E_STATE,    [KILLED_IDLE] = ISCHIA_E_IO,
-        [KILLED_VERSION] = ISCHIA_E_IO};
+        [KILLED_YIELD] = ISCHIA_E_IO,       [KILLED_VERSION] = ISCHIA_E_IO};
     end_render(pool, render, code_of[worker->killed], NULL, words);
 }
 
@@ -177,11 +178,18 @@ static void start_worker(struct pool *pool, struct worker *worker)
 
 static void hear(struct pool *pool, struct worker *worker);
 
+/* It ended because we wanted it to, not because anything was wrong with it. */
+static bool was_told(const struct worker *worker)
+{
+    return worker->killed == KILLED_CANCEL || worker->killed == KILLED_DRAIN ||
+           worker->killed == KILLED_IDLE || worker->killed == KILLED_YIELD;
+}
+
 static void note_death(struct pool *pool, struct worker *worker, int pid, const char *words)
 {
-    const bool told = worker->killed == KILLED_CANCEL || worker->killed == KILLED_DRAIN ||
-                      worker->killed == KILLED_IDLE;
+    const bool told = was_told(worker);
     if (worker->killed == KILLED_CANCEL) count(pool, &pool->stats.cancelled);
+    if (worker->killed == KILLED_YIELD) count(pool, &pool->stats.yielded);
     if (worker->killed == KILLED_DEADLINE) count(pool, &pool->stats.deadlines);
     if (worker->killed == KILLED_PROTOCOL) count(pool, &pool->stats.protocol_errors);
     if (!told) count(pool, &pool->stats.died);
@@ -199,11 +207,9 @@ static void bury(struct pool *pool, struct worker *worker, bool wait)
     const int pid = worker->process.pid;
     if (worker->state == WORKER_DOWN || !spawn_reap(&worker->process, wait, words)) return;
     const char *why = worker->killed == KILLED_NOT ? words : worker->why;
-    const bool told = worker->killed == KILLED_CANCEL || worker->killed == KILLED_DRAIN ||
-                      worker->killed == KILLED_IDLE;
     worker->state = WORKER_DOWN;
     worker_reset(worker);
-    if (told) worker->backoff_ms = 0;
+    if (was_told(worker)) worker->backoff_ms = 0;
     start_later(pool, worker);
     note_death(pool, worker, pid, why);
     end_job_of_dead(pool, worker, why);
@@ -401,6 +407,7 @@ static struct wishes take_wishes(struct pool *pool)
                                   .cancels = pool->cancels};
     pool->cancels = NULL;
     pool->may_have_job |= pool->wanted;
+    pool->may_press |= pool->wanted;
     pool->wanted = false;
     (void)pthread_mutex_unlock(&pool->lock);
     return wishes;
@@ -447,6 +454,37 @@ static void mind_worker(struct pool *pool, struct worker *worker, const struct w
         kill_worker(worker, KILLED_IDLE, "idle");
 }
 
+/* ------------------------------------------------------------------------- making room */
+
+/* The one that has worked for the shortest time: the least is lost. NULL: none. */
+static struct worker *latest_that_yields(struct pool *pool)
+{
+    struct worker *latest = NULL;
+    for (int i = 0; i < pool->options.solve_workers; i++) {
+        struct worker *worker = &pool->worker[i];
+        if (worker_yields(worker) && (latest == NULL || worker->begun_ms > latest->begun_ms))
+            latest = worker;
+    }
+    return latest;
+}
+
+/* Ends as many solves that yield as there are pressing jobs without a worker in sight. */
+static void make_room(struct pool *pool, const struct wishes *wishes)
+{
+    struct worker *latest = latest_that_yields(pool);
+    const int64_t now_ms = worker_now_ms();
+    if (!pool->may_press || pool->host.pressing == NULL || wishes->draining || latest == NULL)
+        return;
+    pool->may_press = false;
+    int64_t needed = pool->host.pressing(pool->host.context);
+    for (int i = 0; i < pool->options.solve_workers; i++)
+        needed -= worker_is_coming_free(&pool->worker[i], now_ms);
+    for (; needed > 0 && latest != NULL; needed--) {
+        kill_worker(latest, KILLED_YIELD, "its worker is needed for a job that may not wait");
+        latest = latest_that_yields(pool);
+    }
+}
+
 static void update_stats(struct pool *pool)
 {
     int ready = 0, busy = 0;
@@ -483,6 +521,7 @@ static void tick(struct pool *pool)
     if (now_ms < pool->next_tick_ms) return;
     pool->next_tick_ms = now_ms + pool->options.poll_ms;
     pool->may_have_job = true; /* another process may have put one in */
+    pool->may_press = true;
     expire_renders(pool, now_ms);
     if (pool->host.on_tick != NULL) pool->host.on_tick(pool->host.context);
 }
@@ -535,6 +574,7 @@ static void *pool_main(void *argument)
         if (is_done(pool, &wishes)) break;
         tick(pool);
         for (int i = 0; i < pool->worker_count; i++) mind_worker(pool, &pool->worker[i], &wishes);
+        make_room(pool, &wishes);
         update_stats(pool);
         struct epoll_event event[EVENTS_MAX];
         const int timeout_ms = time_to_sleep(pool, &wishes);
@@ -568,21 +608,6 @@ static struct pool_options with_defaults(const struct pool_options *given)
     return options;
 }
 
-static char **copy_command(const char *const *command)
-{
-    size_t count = 0, bytes = 0;
-    for (; command[count] != NULL; count++) bytes += strlen(command[count]) + 1;
-    char **copy = malloc((count + 1) * sizeof *copy + bytes);
-    if (copy == NULL) return NULL;
-    char *text = (char *)(copy + count + 1);
-    for (size_t i = 0; i < count; i++) {
-        copy[i] = text;
-        text = stpcpy(text, command[i]) + 1;
-    }
-    copy[count] = NULL;
-    return copy;
-}
-
 static void set_up_workers(struct pool *pool)
 {
     for (int i = 0; i < pool->worker_count; i++)
@@ -611,7 +636,7 @@ static enum ischia_code set_up(struct pool *pool, const char *const *command,
 {
     pool->worker_count = pool->options.solve_workers + pool->options.render_workers;
     pool->worker = calloc((size_t)pool->worker_count, sizeof *pool->worker);
-    pool->command = copy_command(command);
+    pool->command = worker_copy_command(command);
     CHECK(pool->worker != NULL && pool->command != NULL, err, ISCHIA_E_MEMORY,
           "no memory for the worker pool");
     set_up_workers(pool);

@@ -16,7 +16,8 @@
  *
  * Each worker is a child with a minimal environment, one socket, a memory limit and a deadline for
  * each job; it is a process group of its own and dies with the daemon. A worker that dies, hangs,
- * or talks nonsense is replaced, with a growing pause when that happens again and again.
+ * or talks nonsense is replaced, with a growing pause when that happens again and again. A job that
+ * yields is stopped, and given back to the host, when one that may not wait finds no worker.
  * Solves and renders have separate workers, so that a drawing never waits for a solve; render
  * workers start when the first drawing is asked for and leave when idle.
  */
@@ -41,8 +42,10 @@ struct pool_options {
 
 struct pool_job {
     struct uuid id;
-    int64_t attempt; /* this and crashes are the host's: the pool only carries them           */
+    int64_t line; /* this and the next two are the host's: the pool only carries them         */
+    int64_t attempt;
     int crashes;
+    bool yields;     /* may be taken back for one that may not wait (pool_host.pressing)      */
     char *case_json; /* owned by the pool once handed over                                    */
 };
 
@@ -60,6 +63,7 @@ enum pool_end {
     POOL_DEADLINE,  /* it took longer than allowed and was killed                              */
     POOL_DRAINED,   /* the pool is stopping and took it back                                   */
     POOL_CANCELLED, /* pool_cancel; its worker is dead                                        */
+    POOL_YIELDED,   /* taken back for a job that may not wait; its worker is dead             */
     POOL_END_COUNT
 };
 extern const char *const pool_end_names[POOL_END_COUNT];
@@ -94,6 +98,9 @@ struct pool_host {
     void *context;
     /* Fills *ret and returns true when there is a job to solve. */
     bool (*next_job)(void *context, struct pool_job *ret);
+    /* How many jobs wait that are not to wait for one that yields. Asked only while one of those is
+     * being solved. May be NULL: none. */
+    int64_t (*pressing)(void *context);
     void (*on_progress)(void *context, const struct pool_job *job,
                         const struct pool_progress *progress);
     /* Exactly once for each job handed over. */
@@ -139,7 +146,7 @@ struct pool_stats {
     int workers; /* solve workers wanted                                                     */
     int ready;   /* of them, idle after hello                                                */
     int busy;    /* of them, solving                                                         */
-    uint64_t started, died, cancelled, deadlines, protocol_errors; /* since create            */
+    uint64_t started, died, cancelled, yielded, deadlines, protocol_errors; /* since create   */
     uint64_t renders, renders_failed;
     int renders_waiting;
     char program[POOL_PROGRAM_BYTES]; /* what the worker that came last calls itself: program and

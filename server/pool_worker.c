@@ -10,7 +10,8 @@
 
 const char *const pool_end_names[POOL_END_COUNT] = {
     [POOL_RESULT] = "result",     [POOL_PROBLEM] = "problem", [POOL_CRASHED] = "crashed",
-    [POOL_DEADLINE] = "deadline", [POOL_DRAINED] = "drained", [POOL_CANCELLED] = "cancelled"};
+    [POOL_DEADLINE] = "deadline", [POOL_DRAINED] = "drained", [POOL_CANCELLED] = "cancelled",
+    [POOL_YIELDED] = "yielded"};
 const char *const pool_render_names[POOL_RENDER_KIND_COUNT] = {
     [POOL_RENDER_VTU] = "vtu", [POOL_RENDER_SVG] = "svg"};
 
@@ -38,6 +39,33 @@ void worker_reset(struct worker *worker)
     worker->wants_to_write = false;
     worker->expects = EXPECTS_MESSAGE;
     worker->deadline_ms = 0;
+}
+
+bool worker_is_coming_free(const struct worker *worker, int64_t now_ms)
+{
+    return worker->state == WORKER_IDLE || worker->state == WORKER_STARTING ||
+           worker->state == WORKER_DYING ||
+           (worker->state == WORKER_DOWN && now_ms >= worker->start_at_ms);
+}
+
+bool worker_yields(const struct worker *worker)
+{
+    return worker->state == WORKER_BUSY && worker->has_job && worker->job.yields;
+}
+
+char **worker_copy_command(const char *const *command)
+{
+    size_t count = 0, bytes = 0;
+    for (; command[count] != NULL; count++) bytes += strlen(command[count]) + 1;
+    char **copy = malloc((count + 1) * sizeof *copy + bytes);
+    if (copy == NULL) return NULL;
+    char *text = (char *)(copy + count + 1);
+    for (size_t i = 0; i < count; i++) {
+        copy[i] = text;
+        text = stpcpy(text, command[i]) + 1;
+    }
+    copy[count] = NULL;
+    return copy;
 }
 
 /* ------------------------------------------------------------------------------- hearing */

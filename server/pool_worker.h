@@ -50,6 +50,7 @@ enum worker_killed {
     KILLED_PROTOCOL,
     KILLED_DRAIN,
     KILLED_IDLE,
+    KILLED_YIELD,
     KILLED_VERSION
 };
 
@@ -108,6 +109,14 @@ ISCHIA_MUST_CHECK enum ischia_code worker_put_render(struct worker *worker,
 
 /* Forgets the conversation of a worker that was reaped. */
 void worker_reset(struct worker *worker);
+
+/* It will ask for a job without anybody's doing anything, and soon. */
+bool worker_is_coming_free(const struct worker *worker, int64_t now_ms);
+/* It solves something that may be taken back. */
+bool worker_yields(const struct worker *worker);
+
+/* A copy of an argv in one block, with its strings; NULL when there is no memory. */
+char **worker_copy_command(const char *const *command);
 
 int64_t worker_now_ms(void); /* CLOCK_MONOTONIC */
 

@@ -16,6 +16,7 @@ enum { EVENTS_AGE_MS = 60 * 1000 };
 /* What is to be written about a job that has ended. */
 struct verdict {
     struct uuid id;
+    int64_t line; /* of a study's point, whose id is the study's; 0: an assessment */
     int64_t attempt;
     enum queue_state to; /* succeeded, failed, or queued again */
     bool crashed;        /* queued again because its worker died */
@@ -73,8 +74,19 @@ static void verdict_finish(struct verdict *verdict)
     free(verdict->field);
 }
 
+static void announce_point(struct queue *queue, const struct verdict *verdict)
+{
+    if (queue->watcher.on_point != NULL)
+        queue->watcher.on_point(queue->watcher.context, verdict->to, verdict->end,
+                                verdict->wall_ms);
+}
+
 static void announce(struct queue *queue, const struct verdict *verdict)
 {
+    if (verdict->line != 0) {
+        announce_point(queue, verdict);
+        return;
+    }
     publish_state(queue, &verdict->id, verdict->to);
     if (queue_is_final(verdict->to) && queue->watcher.on_finished != NULL)
         queue->watcher.on_finished(queue->watcher.context, &verdict->id, verdict->to, verdict->end,
@@ -84,6 +96,9 @@ static void announce(struct queue *queue, const struct verdict *verdict)
 static enum ischia_code write_verdict(struct queue *queue, const struct verdict *v,
                                       enum store_answer *ret_answer, struct ischia_error *err)
 {
+    if (v->line != 0)
+        return store_study_settle(queue->store, &v->id, v->line, v->attempt, v->to, v->document,
+                                  v->crashed, ret_answer, err);
     switch (v->to) {
     case QUEUE_SUCCEEDED:
         return store_succeed(queue->store, &v->id, v->attempt, v->document, v->field, v->field_size,
@@ -191,13 +206,15 @@ static void judge_crash(const struct queue *queue, const struct pool_job *job, c
     fail_with(verdict, PROBLEM_WORKER_DIED, words);
 }
 
+/* A study keeps no fields. */
 static bool copy_document(struct verdict *verdict, const struct pool_outcome *outcome)
 {
+    const size_t size = verdict->line == 0 ? outcome->field_size : 0;
     verdict->document = strdup(outcome->document);
-    verdict->field = malloc(outcome->field_size > 0 ? outcome->field_size : 1);
+    verdict->field = malloc(size > 0 ? size : 1);
     if (verdict->document == NULL || verdict->field == NULL) return false;
-    if (outcome->field_size > 0) memcpy(verdict->field, outcome->field, outcome->field_size);
-    verdict->field_size = outcome->field_size;
+    if (size > 0) memcpy(verdict->field, outcome->field, size);
+    verdict->field_size = size;
     return true;
 }
 
@@ -223,6 +240,7 @@ static void on_outcome(void *context, const struct pool_job *job,
 {
     struct queue *queue = context;
     struct verdict verdict = {.id = job->id,
+                              .line = job->line,
                               .attempt = job->attempt,
                               .to = QUEUE_QUEUED,
                               .end = outcome->end,
@@ -240,7 +258,8 @@ static void on_outcome(void *context, const struct pool_job *job,
     case POOL_DEADLINE:
         fail_with(&verdict, PROBLEM_TIME_LIMIT, verdict.detail);
         break;
-    /* drained: back into the queue. Cancelled: the store refuses that, being there before us. */
+    /* drained, yielded: back into the queue. Cancelled: the store refuses that, being there before
+     * us. */
     default:
         break;
     }
@@ -254,6 +273,37 @@ static void on_cached(void *context, const struct uuid *id)
     publish_state(context, id, QUEUE_SUCCEEDED);
 }
 
+/* When nobody waits for an assessment. */
+static bool next_point(struct queue *queue, struct pool_job *ret)
+{
+    struct store_study_claim claim = {0};
+    struct ischia_error err = {0};
+    enum store_answer answer = STORE_NOT_FOUND;
+    if (store_study_claim_next(queue->store, &claim, &answer, &err) != ISCHIA_OK) {
+        report_store_error(queue, &err);
+        return false;
+    }
+    if (answer != STORE_DONE) return false;
+    *ret = (struct pool_job){.id = claim.study,
+                             .line = claim.line,
+                             .attempt = claim.attempt,
+                             .crashes = claim.crashes,
+                             .yields = true,
+                             .case_json = claim.case_json};
+    return true;
+}
+
+/* Assessments that wait. When the store cannot say, nobody is pressed. */
+static int64_t pressing(void *context)
+{
+    struct queue *queue = context;
+    struct store_stats stats;
+    struct ischia_error err = {0};
+    if (store_stats(queue->store, &stats, &err) == ISCHIA_OK) return stats.count[QUEUE_QUEUED];
+    report_store_error(queue, &err);
+    return 0;
+}
+
 static bool next_job(void *context, struct pool_job *ret)
 {
     struct queue *queue = context;
@@ -265,7 +315,7 @@ static bool next_job(void *context, struct pool_job *ret)
         report_store_error(queue, &err);
         return false;
     }
-    if (answer != STORE_DONE) return false;
+    if (answer != STORE_DONE) return next_point(queue, ret);
     publish_state(queue, &claim.id, QUEUE_RUNNING);
     *ret = (struct pool_job){.id = claim.id,
                              .attempt = claim.attempt,
@@ -278,6 +328,7 @@ static void on_progress(void *context, const struct pool_job *job,
                         const struct pool_progress *progress)
 {
     struct queue *queue = context;
+    if (job->line != 0) return; /* nobody watches one point of a study */
     struct event event = {.kind = EVENT_PROGRESS,
                           .state = QUEUE_RUNNING,
                           .fraction = progress->fraction,
@@ -321,6 +372,7 @@ static enum ischia_code start(struct queue *queue, const struct pool_options *op
 {
     const struct pool_host host = {.context = queue,
                                    .next_job = next_job,
+                                   .pressing = pressing,
                                    .on_progress = on_progress,
                                    .on_outcome = on_outcome,
                                    .on_note = on_note,
@@ -451,5 +503,24 @@ enum ischia_code queue_cancel(struct queue *queue, const struct uuid *id, enum q
     if (*ret_answer != STORE_DONE) return ISCHIA_OK;
     if (*ret_was == QUEUE_RUNNING) pool_cancel(queue->pool, id);
     publish_state(queue, id, QUEUE_CANCELLED);
+    return ISCHIA_OK;
+}
+
+/* ------------------------------------------------------------------------------- studies */
+
+enum ischia_code queue_accept_study(struct queue *queue, const struct store_study_new *what,
+                                    struct store_study_accepted *ret, struct ischia_error *err)
+{
+    CHECK(!atomic_load(&queue->draining), err, ISCHIA_E_STATE, "the daemon is stopping");
+    TRY(store_study_accept(queue->store, what, ret, err));
+    if (ret->acceptance == STORE_ACCEPTED) pool_wake(queue->pool);
+    return ISCHIA_OK;
+}
+
+enum ischia_code queue_cancel_study(struct queue *queue, const struct uuid *id,
+                                    enum store_answer *ret_answer, struct ischia_error *err)
+{
+    TRY(store_study_cancel(queue->store, id, ret_answer, err));
+    if (*ret_answer == STORE_DONE) pool_cancel(queue->pool, id);
     return ISCHIA_OK;
 }

@@ -6,6 +6,7 @@
 #include "server/pool.h"
 #include "server/queue_state.h"
 #include "server/store/store.h"
+#include "server/store/studies.h"
 
 /*
  * The queue ties store, pool and events together: what is durable is in the store, what runs is in
@@ -15,6 +16,9 @@
  * A worker's death on a job is retried once and then fails the job with the reason. A job over its
  * deadline fails at once: the same case takes the same time again. When the store cannot take an
  * outcome (disk full) the queue keeps it and offers it again, and claims nothing meanwhile.
+ *
+ * Points of studies are solved when no assessment waits. An assessment that finds every worker busy
+ * takes the place of the point that was begun last, which goes back and is solved again later.
  */
 
 struct queue;
@@ -32,6 +36,8 @@ struct queue_watcher {
     void (*on_note)(void *context, const struct pool_note *note);
     void (*on_finished)(void *context, const struct uuid *id, enum queue_state state,
                         enum pool_end end, int64_t wall_ms, const char *detail);
+    /* A point of a study was solved, failed, was cancelled, or goes back (QUEUE_QUEUED). */
+    void (*on_point)(void *context, enum queue_state state, enum pool_end end, int64_t wall_ms);
     void (*on_store_error)(void *context, const struct ischia_error *err);
 };
 
@@ -59,6 +65,18 @@ queue_accept_later(struct queue *queue, const struct store_new *what, store_acce
 ISCHIA_MUST_CHECK enum ischia_code
 queue_cancel(struct queue *queue, const struct uuid *id, enum queue_state *ret_was,
              enum store_answer *ret_answer, struct ischia_error *err);
+
+/* store_study_accept, and the workers are woken. The case keys are to be filled in already. After
+ * queue_drain: ISCHIA_E_STATE. */
+ISCHIA_MUST_CHECK enum ischia_code
+queue_accept_study(struct queue *queue, const struct store_study_new *what,
+                   struct store_study_accepted *ret, struct ischia_error *err);
+
+/* Cancels durably what is not over, then ends the workers that solve any of it. As
+ * store_study_cancel. */
+ISCHIA_MUST_CHECK enum ischia_code queue_cancel_study(struct queue *queue, const struct uuid *id,
+                                                      enum store_answer *ret_answer,
+                                                      struct ischia_error *err);
 
 struct pool *queue_pool(struct queue *queue); /* for renders and stats */
 

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FILE_BYTES_MAX = 256 * 1024 };
+enum { FILE_BYTES_MAX = 4 * 1024 * 1024 };
 
 enum ischia_code textfile_read(const char *path, char **ret, struct ischia_error *err)
 {

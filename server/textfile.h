@@ -4,7 +4,7 @@
 
 #include "solver/error.h"
 
-/* The whole of a small file (keys, certificates, secrets: at most 256 KiB), NUL-terminated, the
+/* The whole of a small file (keys, certificates, an emulator: at most 4 MiB), NUL-terminated, the
  * caller's to free. ISCHIA_E_IO with the path: it cannot be read, is empty, or is too large. */
 ISCHIA_MUST_CHECK enum ischia_code textfile_read(const char *path, char **ret,
                                                  struct ischia_error *err);

@@ -36,6 +36,14 @@ const struct ischia_preset ischia_presets[] = {
       [ISCHIA_FRICTION] = 0.4,
       [ISCHIA_R2_SURFACE] = 0,
       [ISCHIA_EMBED_OVER_R1] = 1}},
+    {"as-published",
+     {[ISCHIA_SKIN_MU] = 67,
+      [ISCHIA_SKIN_THICKNESS] = 1,
+      [ISCHIA_L_OVER_H] = 2,
+      [ISCHIA_BULK_RATIO] = 30,
+      [ISCHIA_FRICTION] = 0.4,
+      [ISCHIA_R2_SURFACE] = 0,
+      [ISCHIA_EMBED_OVER_R1] = 1}},
 };
 const size_t ischia_preset_count = sizeof ischia_presets / sizeof ischia_presets[0];
 

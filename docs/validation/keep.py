@@ -33,6 +33,12 @@ def machine():
     return f"{words}, {os.cpu_count()} processors, {system}"
 
 
+def version_of(program):
+    """Program and model, as the manifest has them."""
+    said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)
+    return ", ".join(said.stdout.splitlines()[:2])
+
+
 def keep(name, result, program, command, title, data=DATA):
     text = pathlib.Path(result).read_bytes()
     data.mkdir(parents=True, exist_ok=True)
@@ -50,7 +56,7 @@ def keep(name, result, program, command, title, data=DATA):
         "title": title or name,
         "rows": text.count(b"\n") - 1,
         "sha256": hashlib.sha256(text).hexdigest(),
-        "version": ", ".join(lines[:2]),
+        "version": version_of(program),
         "libraries": ", ".join(lines[2:]),
         "command": command,
         "machine": machine(),

@@ -16,17 +16,23 @@ import hashlib
 import io
 import json
 import math
+import os
 import pathlib
 import subprocess
 import sys
 import tempfile
 
 import plots
+import runs
+from readings import READINGS
+from words import percent, quantile, signed, solved, table, value
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 PUBLISHED = HERE / "published/macron2020.json"
 DESIGN = ROOT / "examples/design_table1.json"
+# The linear algebra library chooses its kernels by the processor: one choice, the same last digits.
+SAME_BITS = {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"}
 FACTORS = ["R1", "R2", "eM", "eF", "muM", "muF", "F"]
 NAMES = {
     "R1": "R1 (mm)",
@@ -65,6 +71,7 @@ class Results:
     def study(self, command, name, *options):
         done = subprocess.run(
             [self.program, "study", command, str(self.work / f"{name}.csv"), *options, "-o", "-"],
+            env={**os.environ, **SAME_BITS},
             capture_output=True,
             text=True,
             check=False,
@@ -77,39 +84,35 @@ class Results:
         return self.study("emulate", name, "--design", str(DESIGN), "--published", str(PUBLISHED))
 
 
-def solved(rows):
-    return [r for r in rows if r["status"] == "succeeded"]
-
-
-def value(row, column, default=math.nan):
-    return float(row[column]) if row.get(column) else default
-
-
-def table(header, rows, right=()):
-    marks = ["---:" if i in right else "---" for i in range(len(header))]
-    lines = [header, marks, *rows]
-    return "\n".join("| " + " | ".join(str(c) for c in line) + " |" for line in lines) + "\n"
-
-
-def signed(x, digits=4):
-    return "" if x is None else f"{x:+.{digits}f}".replace("-", "−")
-
-
-def percent(x):
-    return "" if x is None else f"{x:.2g}" if x < 1 else f"{x:.1f}" if x < 10 else f"{x:.0f}"
-
-
-def quantile(values, q):
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(q * len(ordered)))]
-
-
 # ---- sections: each returns Markdown, "" when its files are not there ----
+
+
+def missing(results, out):
+    """Which runs the page still waits for: nothing below is made up for them."""
+    rows = [[f"`{r.name}`", r.title, f"`{r.command()}`"] for r in runs.RUNS]
+    rows = [row for row, r in zip(rows, runs.RUNS) if not results.has(r.name)]
+    left = [words for name, words, _ in READINGS if not results.has(f"reading_{name}")]
+    if left:
+        rows.append(
+            [
+                "`reading_…`",
+                f"{len(left)} of {len(READINGS)} readings on a subset",
+                "`readings.py --keep`",
+            ]
+        )
+    if not rows:
+        return ""
+    return (
+        "## What has not been run yet\n\nThis page is written from kept result files, and these"
+        " are not there. Sections that need them are missing; no number stands in for them."
+        " `docs/validation/run.py` makes all of them and writes this page again.\n\n"
+        + table(["file", "what", "command"], rows)
+    )
 
 
 def provenance(results, out):
     if not results.manifest:
-        return "## What was run\n\nNo result files are kept yet."
+        return ""
     rows = [
         [
             f"`{name}`",
@@ -281,12 +284,22 @@ def predictors(results, out):
     )
 
 
+def reasons(bad):
+    """How many failed for which reason: the first word of each."""
+    counts = {}
+    for r in bad:
+        word = r["reason"].split(":")[0]
+        counts[word] = counts.get(word, 0) + 1
+    return ", ".join(f"{n} `{word}`" for word, n in sorted(counts.items(), key=lambda c: -c[1]))
+
+
 def failures(rows):
     bad = [r for r in rows if r["status"] != "succeeded"]
     if not bad:
         return ""
     return (
-        table(
+        f"Not converged: {reasons(bad)}. Each with how far it came:\n\n"
+        + table(
             ["row", *FACTORS, "reason", "last converged F, N"],
             [
                 [r["row"], *(r[f] for f in FACTORS), r["reason"], r.get("last_converged_F_N", "")]
@@ -374,6 +387,27 @@ def side_by_side(fits, degree):
         for c in terms
     ]
     return table(header, rows, range(1, len(header)))
+
+
+def leading(fits):
+    """Signs and order of the four leading first-order effects against Table 3."""
+    published = json.loads(PUBLISHED.read_text())["degree_1"]["terms"]
+    wanted = sorted(published, key=lambda t: -t["S_percent"])[:4]
+    text = ""
+    for key, document in fits.items():
+        fit = next(f for f in document["fits"] if f["degree"] == 1)
+        theta = {c["term"]: c["theta"] for c in fit["coefficients"]}
+        order = sorted(fit["parameters"], key=lambda p: -p["S_percent"])
+        ours = [p["key"] for p in order[:4]]
+        turned = [t["term"] for t in wanted if theta[t["term"]] * t["theta"] < 0]
+        same = ours == [t["term"] for t in wanted]
+        text += (
+            f"- {key}: {' > '.join(plots.symbol(p) for p in ours)};"
+            f" {'the order of Table 3' if same else 'not the order of Table 3'},"
+            f" {'with its signs' if not turned else 'with another sign for ' + ', '.join(turned)}.\n"
+        )
+    printed = " > ".join(plots.symbol(t["term"]) for t in wanted)
+    return f"The four leading first-order effects; Table 3 prints {printed}:\n\n{text}\n"
 
 
 def parameter_table(fits, degree):
@@ -464,6 +498,7 @@ def tables(results, out):
             + "\n"
             + parameter_table(fits, degree)
             + "\n"
+            + (leading(fits) if degree == 1 else "")
         )
         printed = {
             t["term"].replace("muM*eM", "eM*muM").replace("muM*eF", "eF*muM"): t["theta"]
@@ -730,11 +765,14 @@ def main():
     a = parse.parse_args()
     figures = a.out / "validation"
     figures.mkdir(parents=True, exist_ok=True)
+    for old in figures.glob("*.svg"):
+        old.unlink()  # of files that are not kept any more
     with tempfile.TemporaryDirectory() as work:
         results = Results(a.data, a.program, pathlib.Path(work))
         remarks = a.remarks.read_text().strip() if a.remarks.exists() else ""
         sections = [
             remarks,
+            missing(results, figures).strip(),
             *(
                 s(results, figures).strip()
                 for s in (

@@ -10,10 +10,10 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "api/cohort_rows.h"
 #include "api/problem_doc.h"
 #include "api/result_csv.h"
 #include "server/cli/bar.h"
-#include "server/cli/cohort_rows.h"
 #include "server/cli/crew.h"
 #include "server/cli/files.h"
 #include "server/cli/options.h"
@@ -42,7 +42,7 @@ struct row {
 
 struct cohort {
     const char *path;
-    struct cohort_defaults defaults;
+    struct case_doc_defaults defaults;
     struct cohort_columns columns;
     struct csv_reader reader;
     struct line_out out;
@@ -83,7 +83,7 @@ static enum ischia_code refuse_unreadable(struct cohort *k, struct row *row,
                                           struct ischia_error *err)
 {
     const struct csv_row none = {0};
-    struct ischia_case unused;
+    struct ischia_request unused;
     struct doc_faults faults;
     bar_clear(&k->bar);
     (void)fprintf(stderr, "ischia cohort: %s: %s\n", k->path, reason->message);
@@ -98,6 +98,7 @@ static enum ischia_code read_row(struct cohort *k, struct ischia_error *err)
 {
     struct csv_row csv;
     struct doc_faults faults;
+    struct ischia_request request;
     struct row *row = &k->window[k->next_read % WINDOW];
     const enum ischia_code code = csv_read(&k->reader, &csv, &k->all_read, err);
     if (code == ISCHIA_OK && k->all_read) return ISCHIA_OK;
@@ -110,7 +111,9 @@ static enum ischia_code read_row(struct cohort *k, struct ischia_error *err)
         TRY(refuse_unreadable(k, row, &reason, err));
     } else {
         doc_faults_init(&faults);
-        TRY(cohort_row_read(&k->columns, &k->defaults, &csv, &row->echo, &row->c, &faults, err));
+        ischia_request_init(&request);
+        TRY(cohort_row_read(&k->columns, &k->defaults, &csv, &row->echo, &request, &faults, err));
+        row->c = request.values;
         if (faults.count > 0) refuse_faults(k, row, &faults);
     }
     k->next_read++;
@@ -260,23 +263,21 @@ static int run(struct cohort *k, FILE *in, const char *output, int jobs)
 }
 
 /* Options whose values a case would refuse row by row are refused once, before anything is read. */
-static bool defaults_are_known(const struct cohort_defaults *defaults)
+static bool defaults_are_known(const struct case_doc_defaults *defaults)
 {
     struct ischia_request request;
     struct case_doc_fields fields;
     struct doc_faults faults;
     doc_faults_init(&faults);
     case_doc_fields_init(&fields, &request, &faults);
-    if (defaults->resolution != NULL)
-        case_doc_fields_set(&fields, "resolution", defaults->resolution);
-    if (defaults->model != NULL) case_doc_fields_set(&fields, "model", defaults->model);
+    case_doc_fields_set_defaults(&fields, defaults);
     for (size_t i = 0; i < faults.count; i++)
         (void)fprintf(stderr, "ischia cohort: --%s\n", faults.item[i].detail);
     return faults.count == 0;
 }
 
 static int run_file(const char *path, const char *output, int jobs,
-                    const struct cohort_defaults *defaults)
+                    const struct case_doc_defaults *defaults)
 {
     struct ischia_error err;
     FILE *in;
@@ -298,7 +299,7 @@ static int run_file(const char *path, const char *output, int jobs,
 int command_cohort(int argc, char **argv)
 {
     const char *output = "-", *jobs_text = "1", *path = "-";
-    struct cohort_defaults defaults = {NULL, NULL};
+    struct case_doc_defaults defaults = {NULL, NULL};
     const struct cli_option table[] = {
         {"--output", 'o', "OUT", "where to (default: standard output)", &output, NULL},
         {"--jobs", 'j', "N", "how many rows to solve at once (default 1)", &jobs_text, NULL},

@@ -53,10 +53,37 @@ int study_failed(const char *what, const struct ischia_error *err)
     return bad_input ? EXIT_BAD_INPUT : EXIT_SOLVE_FAILED;
 }
 
-int study_usage(const char *what, const char *usage)
+enum ischia_code study_load_plan(struct study_plan *ret, const char *path,
+                                 const struct case_doc_defaults *defaults, struct ischia_error *err)
 {
-    (void)fprintf(stderr, "%s`ischia study %s --help` says more.\n", usage, what);
-    return EXIT_BAD_INPUT;
+    struct doc_faults faults;
+    char *text;
+    size_t length;
+    doc_faults_init(&faults);
+    TRY(file_read(path, STUDY_PLAN_BYTES_MAX, &text, &length, err));
+    const enum ischia_code code =
+        study_plan_read(ret, text, length, defaults, DESIGN_ROWS_MAX, &faults, err);
+    free(text);
+    for (size_t i = 0; i < faults.count; i++)
+        (void)fprintf(stderr, "%s: %s\n", faults.item[i].pointer, faults.item[i].detail);
+    TRY(code);
+    CHECK(faults.count == 0, err, ISCHIA_E_INPUT, "%s is not a design that can be run", path);
+    return ISCHIA_OK;
+}
+
+enum cli_parse study_lacks(const struct cli_usage *usage, const char *what)
+{
+    (void)fprintf(stderr, "ischia %s: it needs %s; see ischia %s --help\n", usage->command, what,
+                  usage->command);
+    return CLI_BAD_USAGE;
+}
+
+enum cli_parse study_parse(const struct cli_usage *usage, int operands_min, int argc, char **argv,
+                           const char **ret_operands)
+{
+    const enum cli_parse parsed = cli_parse_options(usage, argc, argv, ret_operands);
+    if (parsed != CLI_RUN || ret_operands[operands_min - 1] != NULL) return parsed;
+    return study_lacks(usage, usage->synopsis);
 }
 
 enum ischia_code study_write(struct text_out *text, const char *path, struct ischia_error *err)

@@ -4,7 +4,6 @@
  * (the reference, as a rule) agrees with A (the model under test), and the same for each of them.
  * Correlations join any two quantities; errors and Bland-Altman limits only two readings of one.
  */
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,29 +17,13 @@
 #include "solver/study/hertz.h"
 #include "solver/study/statistics.h"
 
-static const char usage[] =
-    "usage: ischia study compare A.csv [B.csv] [--column NAME] [--b-column NAME] [--key NAMES]\n"
-    "                            [-o OUT.json] [--table JOINED.csv]\n";
-static const char help[] =
-    "\nCompares columns of result files (`ischia cohort`, `ischia study factorial`, your own).\n"
-    "With two files, B is the reference: it is regressed on A, and differences are B - A.\n"
-    "\n      --column NAME    the column to compare (default: eps_max)\n"
-    "      --b-column NAME  its name in B, when it differs\n"
-    "      --key NAMES      columns that say which rows belong together, with commas between\n"
-    "                       (default: subject,side or row, whichever both have; else the order)\n"
-    "      --table FILE     write the joined rows, with the analytic baseline, as CSV\n"
-    "  -o, --output FILE    write the statistics as JSON (\"-\": to stdout, without the text)\n"
-    "\neps_hertz is a small-strain Hertz contact of a rigid ellipsoid on a layer. It is valid for\n"
-    "indentations up to a tenth of the tissue, which sitting exceeds by far: a yardstick only.\n";
-
 enum { KEYS_MAX = 4, SERIES_MAX = 8, PAIRS_MAX = 8, NAME_BYTES = 96 };
 
 struct arguments {
     const char *file[2];
     int files;
     const char *column[2];
-    char *key_list;
-    const char *output, *joined;
+    const char *key_list, *output, *joined;
 };
 
 /* One quantity over the joined rows; NaN where a row has none. */
@@ -59,6 +42,7 @@ struct pair {
 struct comparison {
     const struct arguments *arguments;
     struct study_table table[2];
+    char *key_list; /* a copy, cut into the keys */
     int key_count;
     const char *key[KEYS_MAX];
     size_t rows;       /* joined */
@@ -83,7 +67,8 @@ static bool both_have(const struct comparison *c, const char *name)
 static enum ischia_code choose_keys(struct comparison *c, struct ischia_error *err)
 {
     if (c->arguments->key_list != NULL) {
-        char *rest = c->arguments->key_list;
+        char *rest = c->key_list = strdup(c->arguments->key_list);
+        CHECK(rest != NULL, err, ISCHIA_E_MEMORY, "out of memory for the keys");
         for (char *name; (name = strsep(&rest, ",")) != NULL;) {
             CHECK(c->key_count < KEYS_MAX && both_have(c, name), err, ISCHIA_E_INPUT,
                   "not every file has the key column \"%s\"", name);
@@ -416,49 +401,41 @@ static void comparison_finish(struct comparison *c)
         study_table_finish(&c->table[f]);
     }
     free(c->hertz_valid);
+    free(c->key_list);
 }
 
-static bool parse_arguments(int argc, char **argv, struct arguments *a, bool *ret_help)
+static enum cli_parse parse_arguments(int argc, char **argv, struct arguments *a)
 {
-    static const struct option options[] = {{"column", required_argument, NULL, 'c'},
-                                            {"b-column", required_argument, NULL, 'b'},
-                                            {"key", required_argument, NULL, 'k'},
-                                            {"table", required_argument, NULL, 't'},
-                                            {"output", required_argument, NULL, 'o'},
-                                            {"help", no_argument, NULL, 'h'},
-                                            {NULL, 0, NULL, 0}};
+    const struct cli_option table[] = {
+        {"--column", 0, "NAME", "the column to compare (default: eps_max)", &a->column[0], NULL},
+        {"--b-column", 0, "NAME", "its name in B, when it differs", &a->column[1], NULL},
+        {"--key", 0, "NAMES",
+         "columns that join rows, with commas between (default: subject,side\n"
+         "                             or row, whichever both have; else the order)",
+         &a->key_list, NULL},
+        {"--table", 0, "FILE", "the joined rows, with the analytic baseline, as CSV", &a->joined,
+         NULL},
+        {"--output", 'o', "FILE", "the statistics as JSON (\"-\": to stdout, without the text)",
+         &a->output, NULL},
+        {0},
+    };
+    const struct cli_usage usage = {
+        .command = "study compare",
+        .synopsis = "A.csv [B.csv]",
+        .about =
+            "Compares columns of result files (`ischia cohort`, `ischia study factorial`, your\n"
+            "own). With two files, B is the reference: it is regressed on A, and differences\n"
+            "are B - A. eps_hertz is a small-strain Hertz contact of a rigid ellipsoid on a\n"
+            "layer, valid for indentations up to a tenth of the tissue, which sitting exceeds\n"
+            "by far: a yardstick only.",
+        .options = table,
+        .operands_max = 2,
+    };
     *a = (struct arguments){.column = {"eps_max", NULL}};
-    *ret_help = false;
-    optind = 0;
-    for (int c; (c = getopt_long(argc, argv, "o:h", options, NULL)) != -1;) {
-        switch (c) {
-        case 'c':
-            a->column[0] = optarg;
-            break;
-        case 'b':
-            a->column[1] = optarg;
-            break;
-        case 'k':
-            a->key_list = optarg;
-            break;
-        case 't':
-            a->joined = optarg;
-            break;
-        case 'o':
-            a->output = optarg;
-            break;
-        case 'h':
-            *ret_help = true;
-            return true;
-        default:
-            return false;
-        }
-    }
-    a->files = argc - optind;
-    if (a->files < 1 || a->files > 2) return false;
-    for (int f = 0; f < a->files; f++) a->file[f] = argv[optind + f];
+    const enum cli_parse parsed = study_parse(&usage, 1, argc, argv, a->file);
+    a->files = a->file[1] != NULL ? 2 : 1;
     if (a->column[1] == NULL) a->column[1] = a->column[0];
-    return true;
+    return parsed;
 }
 
 int study_compare(int argc, char **argv)
@@ -466,12 +443,8 @@ int study_compare(int argc, char **argv)
     struct arguments arguments;
     struct comparison comparison = {.arguments = &arguments};
     struct ischia_error err;
-    bool want_help;
-    if (!parse_arguments(argc, argv, &arguments, &want_help)) return study_usage("compare", usage);
-    if (want_help) {
-        (void)printf("%s%s", usage, help);
-        return EXIT_DONE;
-    }
+    const enum cli_parse parsed = parse_arguments(argc, argv, &arguments);
+    if (parsed != CLI_RUN) return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
     const enum ischia_code code = run_comparison(&comparison, &err);
     comparison_finish(&comparison);
     return code == ISCHIA_OK ? EXIT_DONE : study_failed("compare", &err);

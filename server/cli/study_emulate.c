@@ -7,30 +7,18 @@
  *   distance = sqrt(mean (ours - printed)^2), in units of the response;
  *   relative = sqrt(sum (ours - printed)^2 / sum printed^2): 0 is equal, 1 is as far as zero.
  */
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "api/json.h"
+#include "api/study_plan.h"
 #include "server/cli/study.h"
-#include "server/cli/study_plan.h"
 #include "server/cli/study_published.h"
 #include "server/cli/study_table.h"
 #include "solver/study/emulator.h"
 #include "solver/study/statistics.h"
-
-static const char usage[] =
-    "usage: ischia study emulate RESULTS.csv [--design DESIGN.json] [--response NAME]\n"
-    "                            [--published FILE.json] [-o OUT.json]\n";
-static const char help[] =
-    "\nFits polynomials of degree 1 and 2 by least squares, in parameters normalised to [-1, 1].\n"
-    "\n      --design FILE     normalise by the design's levels (default: by the smallest and\n"
-    "                        largest value of each column that varies)\n"
-    "      --response NAME   the column to fit (default: eps_max)\n"
-    "      --published FILE  coefficients to set beside ours\n"
-    "  -o, --output FILE     write everything as JSON (\"-\": to stdout, without the tables)\n";
 
 enum { TERM_NAME_BYTES = 2 * DESIGN_NAME_BYTES + 4, DEGREES = 2 };
 
@@ -84,13 +72,9 @@ static enum ischia_code factors_from_columns(struct emulation *e, struct ischia_
 
 static enum ischia_code factors_from_design(struct emulation *e, struct ischia_error *err)
 {
+    const struct case_doc_defaults defaults = {NULL, NULL};
     struct study_plan plan;
-    struct text_out faults;
-    text_out_init(&faults);
-    const enum ischia_code code = study_plan_init(&plan, e->arguments->design, &faults, err);
-    if (faults.length > 0) (void)fputs(faults.text, stderr);
-    text_out_finish(&faults);
-    TRY(code);
+    TRY(study_load_plan(&plan, e->arguments->design, &defaults, err));
     e->factor_count = plan.design.factor_count;
     memcpy(e->factor, plan.design.factor, sizeof e->factor);
     study_plan_finish(&plan);
@@ -419,53 +403,36 @@ static void emulation_finish(struct emulation *e)
     study_table_finish(&e->table);
 }
 
-static bool parse_arguments(int argc, char **argv, struct arguments *a, bool *ret_help)
+static enum cli_parse parse_arguments(int argc, char **argv, struct arguments *a)
 {
-    static const struct option options[] = {{"design", required_argument, NULL, 'd'},
-                                            {"response", required_argument, NULL, 'r'},
-                                            {"published", required_argument, NULL, 'p'},
-                                            {"output", required_argument, NULL, 'o'},
-                                            {"help", no_argument, NULL, 'h'},
-                                            {NULL, 0, NULL, 0}};
+    const struct cli_option table[] = {
+        {"--design", 0, "FILE", "normalise by a design's levels (default: by each column's extent)",
+         &a->design, NULL},
+        {"--response", 0, "NAME", "the column to fit (default: eps_max)", &a->response, NULL},
+        {"--published", 0, "FILE", "coefficients to set beside ours", &a->published, NULL},
+        {"--output", 'o', "FILE", "everything as JSON (\"-\": to stdout, without the tables)",
+         &a->output, NULL},
+        {0},
+    };
+    const struct cli_usage usage = {
+        .command = "study emulate",
+        .synopsis = "RESULTS.csv",
+        .about =
+            "Fits polynomials of degree 1 and 2 by least squares, in parameters normalised to\n"
+            "[-1, 1]: coefficients with standard errors, sensitivities, Sobol' indices.",
+        .options = table,
+        .operands_max = 1,
+    };
     *a = (struct arguments){.response = "eps_max"};
-    *ret_help = false;
-    optind = 0;
-    for (int c; (c = getopt_long(argc, argv, "o:h", options, NULL)) != -1;) {
-        switch (c) {
-        case 'd':
-            a->design = optarg;
-            break;
-        case 'r':
-            a->response = optarg;
-            break;
-        case 'p':
-            a->published = optarg;
-            break;
-        case 'o':
-            a->output = optarg;
-            break;
-        case 'h':
-            *ret_help = true;
-            return true;
-        default:
-            return false;
-        }
-    }
-    if (optind + 1 != argc) return false;
-    a->results = argv[optind];
-    return true;
+    return study_parse(&usage, 1, argc, argv, &a->results);
 }
 
 int study_emulate(int argc, char **argv)
 {
     struct arguments arguments;
     struct ischia_error err;
-    bool want_help;
-    if (!parse_arguments(argc, argv, &arguments, &want_help)) return study_usage("emulate", usage);
-    if (want_help) {
-        (void)printf("%s%s", usage, help);
-        return EXIT_DONE;
-    }
+    const enum cli_parse parsed = parse_arguments(argc, argv, &arguments);
+    if (parsed != CLI_RUN) return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
     struct emulation *e = calloc(1, sizeof *e);
     if (e == NULL) {
         (void)FAIL(&err, ISCHIA_E_MEMORY, "out of memory");

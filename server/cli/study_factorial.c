@@ -4,7 +4,6 @@
  * the end, in the order of the design. Everything in it comes from the design and the solver, so an
  * interrupted and resumed study ends with the same bytes as one that ran through.
  */
-#include <getopt.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -13,30 +12,16 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "api/study_plan.h"
 #include "server/cli/bar.h"
 #include "server/cli/crew.h"
 #include "server/cli/study.h"
 #include "server/cli/study_journal.h"
-#include "server/cli/study_plan.h"
-
-static const char usage[] =
-    "usage: ischia study factorial DESIGN.json -o OUT.csv [-j N] [--shard I/N] [--quiet]\n"
-    "       ischia study factorial DESIGN.json --points [-o POINTS.csv]\n";
-static const char help[] =
-    "\nSolves every point of a design: one row of OUT.csv for each, with status and reason.\n"
-    "\n  -o, --output FILE  the result file; FILE.journal keeps finished rows while it runs, so "
-    "the\n"
-    "                     same command goes on where it was stopped, even by kill -9\n"
-    "  -j, --jobs N       solve N rows at a time (default: one a processor)\n"
-    "      --shard I/N    solve rows I, I+N, I+2N, ... only; `ischia study merge` joins the "
-    "shards\n"
-    "      --points       write the points and solve nothing\n"
-    "  -q, --quiet        no progress on stderr\n"
-    "\nExit status: 0 every row succeeded, 1 some did not (see their reason), 2 bad input.\n";
 
 struct arguments {
     const char *design;
     const char *output;
+    struct case_doc_defaults defaults;
     int jobs;
     size_t shard, shards; /* shard: 0 ... shards - 1 */
     bool points, quiet;
@@ -84,56 +69,52 @@ static bool parse_shard(const char *text, struct arguments *a)
     return true;
 }
 
-static bool parse_jobs(const char *text, struct arguments *a)
+/* What the texts of the options say; a message names the one that is wrong. */
+static bool read_numbers(const struct cli_usage *usage, const char *jobs, const char *shard,
+                         struct arguments *a)
 {
-    const char *end;
-    long jobs;
-    if (!parse_whole(text, 1, CREW_MEMBERS_MAX, '\0', &end, &jobs)) return false;
-    a->jobs = (int)jobs;
-    return true;
+    if (jobs != NULL && !cli_whole_number(usage, "--jobs", jobs, 1, CREW_MEMBERS_MAX, &a->jobs))
+        return false;
+    if (shard == NULL || parse_shard(shard, a)) return true;
+    (void)fprintf(stderr, "ischia study factorial: --shard is I/N with I from 1 to N, not %.40s\n",
+                  shard);
+    return false;
 }
 
-/* False: the usage is wrong. *ret_help: only help was asked for. */
-static bool parse_arguments(int argc, char **argv, struct arguments *a, bool *ret_help)
+static enum cli_parse parse_arguments(int argc, char **argv, struct arguments *a)
 {
-    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                            {"jobs", required_argument, NULL, 'j'},
-                                            {"shard", required_argument, NULL, 's'},
-                                            {"points", no_argument, NULL, 'p'},
-                                            {"quiet", no_argument, NULL, 'q'},
-                                            {"help", no_argument, NULL, 'h'},
-                                            {NULL, 0, NULL, 0}};
-    bool good = true;
+    const char *jobs = NULL, *shard = NULL;
+    const struct cli_option table[] = {
+        {"--output", 'o', "FILE",
+         "the result file; FILE.journal keeps finished rows, so that the\n"
+         "                             same command goes on where it was stopped, even by kill -9",
+         &a->output, NULL},
+        {"--jobs", 'j', "N", "how many rows to solve at once (default: one a processor)", &jobs,
+         NULL},
+        {"--model", 0, "NAME", "a named set of model options, for a design that does not say",
+         &a->defaults.model, NULL},
+        {"--resolution", 0, "NAME", "standard, fine or coarse, likewise", &a->defaults.resolution,
+         NULL},
+        {"--shard", 0, "I/N", "only rows I, I+N, I+2N, ...; `ischia study merge` joins shards",
+         &shard, NULL},
+        {"--points", 0, NULL, "write the points and solve nothing", NULL, &a->points},
+        {"--quiet", 'q', NULL, "no progress on stderr", NULL, &a->quiet},
+        {0},
+    };
+    const struct cli_usage usage = {
+        .command = "study factorial",
+        .synopsis = "DESIGN.json -o OUT.csv",
+        .about = "Solves every point of a design: one row of OUT.csv for each, with status and\n"
+                 "reason.",
+        .options = table,
+        .operands_max = 1,
+    };
     *a = (struct arguments){.jobs = processors(), .shards = 1};
-    *ret_help = false;
-    optind = 0;
-    for (int c; good && (c = getopt_long(argc, argv, "o:j:qh", options, NULL)) != -1;) {
-        switch (c) {
-        case 'o':
-            a->output = optarg;
-            break;
-        case 'j':
-            good = parse_jobs(optarg, a);
-            break;
-        case 's':
-            good = parse_shard(optarg, a);
-            break;
-        case 'p':
-            a->points = true;
-            break;
-        case 'q':
-            a->quiet = true;
-            break;
-        case 'h':
-            *ret_help = true;
-            return true;
-        default:
-            good = false;
-        }
-    }
-    if (!good || optind + 1 != argc) return false;
-    a->design = argv[optind];
-    return a->points || (a->output != NULL && strcmp(a->output, "-") != 0);
+    const enum cli_parse parsed = study_parse(&usage, 1, argc, argv, &a->design);
+    if (parsed != CLI_RUN) return parsed;
+    if (!read_numbers(&usage, jobs, shard, a)) return CLI_BAD_USAGE;
+    const bool to_file = a->output != NULL && strcmp(a->output, "-") != 0;
+    return a->points || to_file ? CLI_RUN : study_lacks(&usage, "--output with a file's name");
 }
 
 static bool in_shard(const struct study *s, size_t row)
@@ -228,6 +209,17 @@ static enum ischia_code add_row(struct study *s, size_t row, double wall_s, stru
     return code;
 }
 
+static void put_answer(struct text_out *out, const struct crew_answer *answer,
+                       const struct study_plan *plan)
+{
+    const struct ischia_numerics *numerics = &answer->result.numerics;
+    const bool solved = answer->code == ISCHIA_OK;
+    study_response_put(
+        out, solved ? &answer->result : NULL,
+        solved ? ischia_reason_name(numerics->reason) : ischia_code_name(answer->code),
+        solved ? numerics->detail : answer->message, plan->response, plan->response_count);
+}
+
 /* A row whose process died (killed for memory, say) is solved once more before it fails. */
 static enum ischia_code row_answered(struct study *s, const struct crew_answer *answer,
                                      struct ischia_error *err)
@@ -242,7 +234,7 @@ static enum ischia_code row_answered(struct study *s, const struct crew_answer *
         return crew_give(&s->crew, answer->job, &c, err);
     }
     text_out_init(&text);
-    study_response_put(&text, answer, s->plan.response, s->plan.response_count);
+    put_answer(&text, answer, &s->plan);
     return add_row(s, row, answer->result.numerics.wall_s, &text, err);
 }
 
@@ -360,18 +352,10 @@ int study_factorial(int argc, char **argv)
     struct arguments arguments;
     struct study study = {.arguments = &arguments};
     struct ischia_error err;
-    struct text_out faults;
-    bool want_help;
-    if (!parse_arguments(argc, argv, &arguments, &want_help))
-        return study_usage("factorial", usage);
-    if (want_help) {
-        (void)printf("%s%s", usage, help);
-        return EXIT_DONE;
-    }
-    text_out_init(&faults);
-    enum ischia_code code = study_plan_init(&study.plan, arguments.design, &faults, &err);
-    if (faults.length > 0) (void)fputs(faults.text, stderr);
-    text_out_finish(&faults);
+    const enum cli_parse parsed = parse_arguments(argc, argv, &arguments);
+    if (parsed != CLI_RUN) return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
+    enum ischia_code code =
+        study_load_plan(&study.plan, arguments.design, &arguments.defaults, &err);
     if (code == ISCHIA_OK) {
         code = arguments.points ? write_points(&study, &err) : run_study(&study, &err);
         study_plan_finish(&study.plan);

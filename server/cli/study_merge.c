@@ -3,18 +3,15 @@
  * Joins shards. The design is read again, so every row can be checked against the inputs it should
  * have; the merged file is byte for byte the one that a single run would have written.
  */
-#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/study_plan.h"
 #include "server/cli/files.h"
 #include "server/cli/study.h"
-#include "server/cli/study_plan.h"
 
 enum { SHARD_BYTES_MAX = 1 << 28 };
-
-static const char usage[] = "usage: ischia study merge DESIGN.json SHARD.csv... -o OUT.csv\n";
 
 struct merge {
     struct study_plan plan;
@@ -88,7 +85,8 @@ static enum ischia_code write_merged(struct merge *m, const char *path, struct i
     return study_write(&out, path, err);
 }
 
-static enum ischia_code run_merge(struct merge *m, char **shards, int count, const char *output,
+/* shards: NULL after the last. */
+static enum ischia_code run_merge(struct merge *m, const char *const *shards, const char *output,
                                   struct ischia_error *err)
 {
     struct text_out header;
@@ -98,7 +96,7 @@ static enum ischia_code run_merge(struct merge *m, char **shards, int count, con
     m->line = calloc(m->plan.points.count + 1, sizeof *m->line);
     CHECK(m->line != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows",
           m->plan.points.count);
-    for (int i = 0; i < count; i++) TRY(take_shard(m, shards[i], err));
+    for (; *shards != NULL; shards++) TRY(take_shard(m, *shards, err));
     return write_merged(m, output, err);
 }
 
@@ -112,26 +110,35 @@ static void merge_finish(struct merge *m)
 
 int study_merge(int argc, char **argv)
 {
-    static const struct option options[] = {{"output", required_argument, NULL, 'o'},
-                                            {"help", no_argument, NULL, 'h'},
-                                            {NULL, 0, NULL, 0}};
+    const struct case_doc_defaults defaults = {NULL, NULL};
     struct merge merge = {.header = NULL};
     struct ischia_error err;
-    struct text_out faults;
     const char *output = NULL;
-    optind = 0;
-    for (int c; (c = getopt_long(argc, argv, "o:h", options, NULL)) != -1;) {
-        if (c == 'h') return printf("%s", usage) > 0 ? EXIT_DONE : EXIT_SOLVE_FAILED;
-        if (c != 'o') return study_usage("merge", usage);
-        output = optarg;
+    const struct cli_option table[] = {
+        {"--output", 'o', "FILE", "the result file", &output, NULL},
+        {0},
+    };
+    const struct cli_usage usage = {
+        .command = "study merge",
+        .synopsis = "DESIGN.json SHARD.csv... -o OUT.csv",
+        .about = "Joins the shards of a design into the file that one run would have written.",
+        .options = table,
+        .operands_max = argc,
+    };
+    const char **files = calloc((size_t)argc + 1, sizeof *files);
+    if (files == NULL) {
+        (void)FAIL(&err, ISCHIA_E_MEMORY, "out of memory");
+        return study_failed("merge", &err);
     }
-    if (optind + 2 > argc || output == NULL) return study_usage("merge", usage);
-    text_out_init(&faults);
-    enum ischia_code code = study_plan_init(&merge.plan, argv[optind], &faults, &err);
-    if (faults.length > 0) (void)fputs(faults.text, stderr);
-    text_out_finish(&faults);
-    if (code == ISCHIA_OK)
-        code = run_merge(&merge, argv + optind + 1, argc - optind - 1, output, &err);
+    enum cli_parse parsed = study_parse(&usage, 2, argc, argv, files);
+    if (parsed == CLI_RUN && output == NULL) parsed = study_lacks(&usage, "--output");
+    if (parsed != CLI_RUN) {
+        free(files);
+        return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
+    }
+    enum ischia_code code = study_load_plan(&merge.plan, files[0], &defaults, &err);
+    if (code == ISCHIA_OK) code = run_merge(&merge, files + 1, output, &err);
     merge_finish(&merge);
+    free(files);
     return code == ISCHIA_OK ? EXIT_DONE : study_failed("merge", &err);
 }

@@ -89,6 +89,7 @@ static void collect(struct service *service)
 {
     struct store_stats stats;
     struct pool_stats pool;
+    int64_t waiting = 0;
     if (store_stats(service->store, &stats, NULL) == ISCHIA_OK) {
         struct timespec now;
         (void)clock_gettime(CLOCK_REALTIME, &now);
@@ -106,6 +107,9 @@ static void collect(struct service *service)
     metrics_set(METRIC_WORKERS, pool.ready + pool.busy);
     metrics_set(METRIC_WORKERS_BUSY, pool.busy);
     metrics_count_to(METRIC_WORKER_DEATHS, pool.died);
+    metrics_count_to(METRIC_STUDY_YIELDS, pool.yielded);
+    if (store_study_waiting(service->store, &waiting, NULL) == ISCHIA_OK)
+        metrics_set(METRIC_STUDY_POINTS_WAITING, (double)waiting);
 }
 
 void handle_metrics(struct call *call, struct http_response *ret)

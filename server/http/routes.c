@@ -13,6 +13,7 @@
 #include "server/metrics.h"
 
 enum { RECORD_BYTES_MAX = 256 * 1024, SEARCH_BYTES_MAX = 4096 };
+enum { STUDY_BYTES_MAX = 1024 * 1024 };
 enum { CASE_BYTES_MAX = 64 * 1024, EMPTY_BODY_BYTES_MAX = 1024, ROUTES_MAX = 64 };
 
 #define JSON       "application/json"
@@ -20,6 +21,8 @@ enum { CASE_BYTES_MAX = 64 * 1024, EMPTY_BODY_BYTES_MAX = 1024, ROUTES_MAX = 64 
 #define HTML       "text/html; charset=utf-8"
 #define TYPES(...) ((const char *const[]){__VA_ARGS__, NULL})
 #define ASSESSMENT "/v1/assessments/{id}"
+#define STUDY      "/v1/studies/{id}"
+#define CSV        "text/csv"
 
 #define FHIR_TYPES TYPES("application/fhir+json", "application/json")
 #define FHIR_QUERY TYPES("_format", "_pretty")
@@ -78,6 +81,21 @@ const struct route routes[] = {
      AUTH_READ, 0, NULL, TYPES("image/svg+xml"), TYPES("lang"), "assessment.read", false},
     {HTTP_GET, ASSESSMENT "/report", "GET " ASSESSMENT "/report", handle_report, AUTH_READ, 0, NULL,
      TYPES("text/html"), TYPES("wait", "lang"), "assessment.read", false},
+    {HTTP_POST, "/v1/estimates", "POST /v1/estimates", handle_estimate, AUTH_ASSESS, CASE_BYTES_MAX,
+     TYPES(JSON), TYPES(JSON), NULL, NULL, false},
+    {HTTP_POST, "/v1/studies", "POST /v1/studies", handle_study_submit, AUTH_ASSESS,
+     STUDY_BYTES_MAX, TYPES(JSON, CSV), TYPES(JSON), TYPES("name", "model", "resolution"),
+     "study.create", false},
+    {HTTP_GET, "/v1/studies", "GET /v1/studies", handle_study_list, AUTH_READ, 0, NULL, TYPES(JSON),
+     TYPES("limit", "cursor"), "study.list", false},
+    {HTTP_GET, STUDY, "GET " STUDY, handle_study_get, AUTH_READ, 0, NULL, TYPES(JSON), NULL,
+     "study.read", false},
+    {HTTP_DELETE, STUDY, "DELETE " STUDY, handle_study_erase, AUTH_ADMIN, EMPTY_BODY_BYTES_MAX,
+     NULL, NULL, NULL, "study.erase", false},
+    {HTTP_POST, STUDY "/cancel", "POST " STUDY "/cancel", handle_study_cancel, AUTH_ASSESS,
+     EMPTY_BODY_BYTES_MAX, NULL, TYPES(JSON), NULL, "study.cancel", false},
+    {HTTP_GET, STUDY "/results", "GET " STUDY "/results", handle_study_results, AUTH_READ, 0, NULL,
+     TYPES(JSON, CSV), NULL, "study.read", false},
     {HTTP_GET, "/v1/parameters", "GET /v1/parameters", handle_parameters, 0, 0, NULL, TYPES(JSON),
      TYPES("lang"), NULL, false},
     {HTTP_GET, "/v1/changes", "GET /v1/changes", handle_changes, AUTH_READ, 0, NULL, TYPES(JSON),

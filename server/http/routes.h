@@ -57,6 +57,9 @@ route_handler handle_submit, handle_get, handle_list, handle_cancel, handle_eras
 route_handler handle_events;
 route_handler handle_field, handle_section;
 route_handler handle_report;
+route_handler handle_estimate;
+route_handler handle_study_submit, handle_study_get, handle_study_list, handle_study_results,
+    handle_study_cancel, handle_study_erase;
 route_handler handle_parameters, handle_changes;
 route_handler handle_openapi, handle_docs, handle_health, handle_ready, handle_metrics,
     handle_version;

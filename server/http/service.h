@@ -9,6 +9,7 @@
 #include "server/audit.h"
 #include "server/auth.h"
 #include "server/config.h"
+#include "server/estimator.h"
 #include "server/events.h"
 #include "server/http/documents.h"
 #include "server/http/http.h"
@@ -27,6 +28,7 @@ struct service {
     struct audit *audit;
     struct rate *rate;
     struct documents *documents; /* finished documents, rendered */
+    struct estimator *estimator; /* NULL: none is installed */
     struct trust *trust;         /* who may call CDS services; NULL: as everywhere, by token */
     /* Read at every request and changed by SIGHUP, hence atomic; the rest of config is constant. */
     struct config config;

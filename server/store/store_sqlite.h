@@ -19,7 +19,7 @@
  *   store_sqlite_job.c    accepting and the life of a job
  *   store_sqlite_read.c   get, list, changes, numbers
  *   store_sqlite_admin.c  tokens, audit      store_sqlite_copy.c  backup, restore
- *   store_sqlite_exchange.c  outbox, feedback
+ *   store_sqlite_exchange.c  outbox, feedback      store_sqlite_study.c  studies
  */
 
 /* ------------------------------------------------------------------------- connections */
@@ -80,6 +80,28 @@ enum sql {
     SQL_OUTBOX_REVIVE,
     SQL_FEEDBACK_ADD,
     SQL_FEEDBACK_LIST,
+    SQL_STUDY_KEY_FIND,
+    SQL_STUDY_KEY_FREE,
+    SQL_STUDY_ADD,
+    SQL_STUDY_POINT_ADD,
+    SQL_STUDY_GET,
+    SQL_STUDY_LIST,
+    SQL_STUDY_COUNT,
+    SQL_STUDY_POINTS,
+    SQL_STUDY_NEXT,
+    SQL_STUDY_KNOWN,
+    SQL_STUDY_BEGIN,
+    SQL_STUDY_POINT_PUT,
+    SQL_STUDY_POINT_GET,
+    SQL_STUDY_END,
+    SQL_STUDY_SEQ,
+    SQL_STUDY_OVER,
+    SQL_STUDY_CANCEL_POINTS,
+    SQL_STUDY_CANCEL,
+    SQL_STUDY_RUNNING,
+    SQL_STUDY_ERASE,
+    SQL_STUDY_TOO_OLD,
+    SQL_STUDY_RECOVER,
     SQL_COUNT
 };
 

@@ -9,6 +9,9 @@
     "a.attempt, a.cached, a.subject, a.side, a.label, a.measured_at, a.case_json, "                \
     "a.warnings_json, a.problem_json, s.result_json, s.field IS NOT NULL, o.document"
 
+#define STUDY_COLUMNS                                                                              \
+    "seq, id, created_ms, started_ms, finished_ms, cancelled, name, columns_json, responses_json"
+
 static const char *const sql_text[SQL_COUNT] = {
     /* IMMEDIATE: another process' write is met here, where waiting for it is harmless */
     [SQL_BEGIN] = "BEGIN IMMEDIATE",
@@ -101,6 +104,47 @@ static const char *const sql_text[SQL_COUNT] = {
     [SQL_FEEDBACK_ADD] = "INSERT INTO feedback (at_ms, service, card, document) "
                          "VALUES (?, ?, ?, ?)",
     [SQL_FEEDBACK_LIST] = "SELECT at_ms, service, card, document FROM feedback ORDER BY seq",
+    [SQL_STUDY_KEY_FIND] = "SELECT body_digest, id FROM study WHERE client = ? AND "
+                           "idempotency_key = ? AND created_ms > ?",
+    [SQL_STUDY_KEY_FREE] = "UPDATE study SET idempotency_key = NULL WHERE client = ? AND "
+                           "idempotency_key = ?",
+    [SQL_STUDY_ADD] = "INSERT INTO study (id, name, columns_json, responses_json, created_ms, "
+                      "client, idempotency_key, body_digest) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+    [SQL_STUDY_POINT_ADD] = "INSERT INTO study_point (study, line, state, refused, case_key, "
+                            "case_json, cells_json, outcome_json) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+    [SQL_STUDY_GET] = "SELECT " STUDY_COLUMNS " FROM study WHERE id = ?",
+    [SQL_STUDY_LIST] =
+        "SELECT " STUDY_COLUMNS " FROM study WHERE seq < ? ORDER BY seq DESC LIMIT ?",
+    [SQL_STUDY_COUNT] = "SELECT state, refused, count(*) FROM study_point WHERE study = ? "
+                        "GROUP BY state, refused",
+    [SQL_STUDY_POINTS] = "SELECT p.line, p.state, p.refused, p.cells_json, p.case_json, "
+                         "p.outcome_json FROM study s JOIN study_point p ON p.study = s.seq "
+                         "WHERE s.id = ? ORDER BY p.line",
+    [SQL_STUDY_NEXT] = "SELECT s.seq, s.id, p.line, p.attempt, p.crashes, p.case_key, p.case_json "
+                       "FROM study_point p JOIN study s ON s.seq = p.study WHERE p.state = 0 "
+                       "ORDER BY p.study, p.line LIMIT 1",
+    [SQL_STUDY_KNOWN] = "SELECT result_json FROM solution WHERE case_key = ? UNION ALL "
+                        "SELECT outcome_json FROM study_point WHERE case_key = ? AND state = 2 "
+                        "LIMIT 1",
+    [SQL_STUDY_BEGIN] = "UPDATE study SET started_ms = ? WHERE seq = ? AND started_ms = 0",
+    [SQL_STUDY_POINT_PUT] = "UPDATE study_point SET state = ?, outcome_json = ?, "
+                            "attempt = attempt + ?, crashes = crashes + ? "
+                            "WHERE study = ? AND line = ?",
+    [SQL_STUDY_POINT_GET] = "SELECT s.seq, p.state, p.attempt FROM study s "
+                            "JOIN study_point p ON p.study = s.seq WHERE s.id = ? AND p.line = ?",
+    [SQL_STUDY_END] = "UPDATE study SET finished_ms = ?1 WHERE seq = ?2 AND finished_ms = 0 AND "
+                      "NOT EXISTS (SELECT 1 FROM study_point WHERE study = ?2 AND state < 2)",
+    [SQL_STUDY_SEQ] = "SELECT seq FROM study WHERE id = ?",
+    /* 0: not over, 1: over, 2: cancelled */
+    [SQL_STUDY_OVER] = "SELECT CASE WHEN finished_ms = 0 THEN 0 ELSE 1 + cancelled END "
+                       "FROM study WHERE seq = ?",
+    [SQL_STUDY_CANCEL_POINTS] = "UPDATE study_point SET state = 4 WHERE study = ? AND state < 2",
+    [SQL_STUDY_CANCEL] = "UPDATE study SET cancelled = 1, finished_ms = ? WHERE seq = ?",
+    [SQL_STUDY_RUNNING] = "SELECT count(*) FROM study_point WHERE study = ? AND state = 1",
+    [SQL_STUDY_ERASE] = "DELETE FROM study WHERE seq = ?",
+    [SQL_STUDY_TOO_OLD] = "SELECT seq FROM study WHERE finished_ms > 0 AND finished_ms < ? "
+                          "ORDER BY finished_ms LIMIT 1",
+    [SQL_STUDY_RECOVER] = "UPDATE study_point SET state = 0 WHERE state = 1",
 };
 
 const char *const sqlite_assessment_columns = ASSESSMENT_COLUMNS;

@@ -120,6 +120,7 @@ static double value_at(const struct design_factor *factor, double x)
 /* Where rows go as a rule makes them: value is NULL while they are only counted. */
 struct sink {
     const struct design *design;
+    size_t rows_max; /* one row more than these is enough */
     size_t count;
     double *value;
 };
@@ -167,7 +168,7 @@ static void put_full(struct sink *sink)
         double *row = next_row(sink);
         for (int f = 0; row != NULL && f < d->factor_count; f++)
             row[f] = d->factor[f].level[number[f]];
-    } while (sink->count <= DESIGN_ROWS_MAX && next_combination(radix, d->factor_count, number));
+    } while (sink->count <= sink->rows_max && next_combination(radix, d->factor_count, number));
 }
 
 static void put_corners(struct sink *sink)
@@ -200,7 +201,7 @@ static void put_sequence(struct sink *sink, double (*point)(uint32_t, int, uint6
 {
     const struct design *d = sink->design;
     double x[DESIGN_FACTORS_MAX];
-    for (uint32_t i = 0; i < d->points; i++) {
+    for (uint32_t i = 0; i < d->points && sink->count <= sink->rows_max; i++) {
         for (int f = 0; f < d->factor_count; f++) x[f] = 2 * point(d->skip + i, f, d->seed) - 1;
         put_coordinates(sink, x);
     }
@@ -234,7 +235,7 @@ static void put_path(struct sink *sink, struct sequence_random *random)
 static void put_morris(struct sink *sink)
 {
     struct sequence_random random = {sink->design->seed};
-    for (uint32_t i = 0; i < sink->design->paths && sink->count <= DESIGN_ROWS_MAX; i++)
+    for (uint32_t i = 0; i < sink->design->paths && sink->count <= sink->rows_max; i++)
         put_path(sink, &random);
 }
 
@@ -244,16 +245,30 @@ static void (*const put_rows[DESIGN_KIND_COUNT])(struct sink *sink) = {
     [DESIGN_MORRIS] = put_morris,
 };
 
-enum ischia_code design_points_init(struct design_points *ret, const struct design *design,
-                                    struct ischia_error *err)
+/* True when a full design's fraction can be sought in good time: a fraction keeps one combination
+ * in modulus to the power of its generators, and more than this many would be thrown away. */
+static bool combinations_are_few(const struct design *d, size_t rows_max)
 {
-    assert(design_is_valid(design));
-    struct sink sink = {.design = design};
+    enum { THROWN_AWAY_MAX = 64 };
+    double combinations = 1;
+    for (int f = 0; f < d->factor_count; f++) combinations *= d->factor[f].level_count;
+    return d->kind != DESIGN_FULL || d->generator_count == 0 ||
+           combinations <= THROWN_AWAY_MAX * (double)rows_max;
+}
+
+enum ischia_code design_points_init(struct design_points *ret, const struct design *design,
+                                    size_t rows_max, struct ischia_error *err)
+{
+    assert(design_is_valid(design) && rows_max <= DESIGN_ROWS_MAX);
+    struct sink sink = {.design = design, .rows_max = rows_max};
+    CHECK(combinations_are_few(design, rows_max), err, ISCHIA_E_LIMIT,
+          "the fraction is of too many combinations");
     put_rows[design->kind](&sink);
-    CHECK(sink.count <= DESIGN_ROWS_MAX, err, ISCHIA_E_LIMIT, "the design has more than %d rows",
-          (int)DESIGN_ROWS_MAX);
+    CHECK(sink.count <= rows_max, err, ISCHIA_E_LIMIT, "the design has more than %zu rows",
+          rows_max);
     const size_t rows = sink.count, room = rows > 0 ? rows : 1;
     sink = (struct sink){.design = design,
+                         .rows_max = rows_max,
                          .value = calloc(room * (size_t)design->factor_count, sizeof(double))};
     CHECK(sink.value != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows", rows);
     put_rows[design->kind](&sink);

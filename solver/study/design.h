@@ -69,9 +69,10 @@ struct design_points {
 /* True when the members above are within their bounds and no factor is named twice. */
 bool design_is_valid(const struct design *design);
 
-/* design is valid (asserted). ISCHIA_E_LIMIT above DESIGN_ROWS_MAX rows; ISCHIA_E_MEMORY. */
+/* design is valid (asserted). ISCHIA_E_LIMIT above rows_max rows (at most DESIGN_ROWS_MAX), or when
+ * a fraction would have to be sought among very many more combinations; ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code design_points_init(struct design_points *ret,
-                                                      const struct design *design,
+                                                      const struct design *design, size_t rows_max,
                                                       struct ischia_error *err);
 void design_points_finish(struct design_points *points); /* a zeroed one is allowed */
 

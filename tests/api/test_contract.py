@@ -11,7 +11,8 @@ import tempfile
 import unittest
 import urllib.parse
 
-from service import HERE, JSON, PATIENCE_S, PROGRAM, SIDE, Service, side
+from emulator_file import write_emulator
+from service import HERE, JSON, PATIENCE_S, PROGRAM, SIDE, Service, eventually, side
 
 METHODS = ('get', 'post', 'put', 'patch', 'delete')
 FORM = {'Content-Type': 'application/x-www-form-urlencoded'}
@@ -37,13 +38,17 @@ class Contract(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         install_validators()
-        cls.service = Service()
+        cls.folder = tempfile.TemporaryDirectory()
+        emulator = os.path.join(cls.folder.name, 'emulator.txt')
+        write_emulator(emulator)
+        cls.service = Service('--emulator', emulator)
         cls.service.until_ready()
         cls.contract = cls.service.get('/openapi.json').json()
 
     @classmethod
     def tearDownClass(cls):
         cls.service.stop()
+        cls.folder.cleanup()
 
     def operations(self):
         for path, item in self.contract['paths'].items():
@@ -90,6 +95,11 @@ class Contract(unittest.TestCase):
                 (option['accepted']['min'], option['accepted']['max'], option['default']),
             )
         self.assertEqual(request['resolution']['enum'], [r['name'] for r in served['resolutions']])
+        presets = [preset['name'] for preset in served['presets']]
+        self.assertEqual(request['model']['oneOf'][0]['enum'], presets)
+        for parameter in self.contract['paths']['/v1/studies']['post']['parameters']:
+            if parameter.get('name') == 'model':
+                self.assertEqual(parameter['schema']['enum'], presets)
 
     def test_the_query_parameters_are_taken_and_no_others(self):
         for method, path, operation in self.operations():
@@ -181,7 +191,51 @@ class Contract(unittest.TestCase):
             ask('PUT', path, path)
             ask('GET', path, path, headers={'Accept': 'image/png'})
         ask('GET', '/v1/changes?since=x', '/v1/changes')
+        self.tour_of_studies(ask)
+        self.tour_of_estimates(ask)
         return asked
+
+    def tour_of_estimates(self, ask):
+        one, inside = '/v1/estimates', side(R2=40)
+        for body in (inside, side(R1=4), side(model='as-published'), side(muM=99)):
+            ask('POST', one, one, body)
+        for body, headers in ((b'{', JSON), (b'x', {'Content-Type': 'text/plain'})):
+            ask('POST', one, one, body, headers)
+        ask('GET', one, one)
+        ask('POST', one, one, json.dumps(inside).encode(), {**JSON, 'Accept': 'image/png'})
+
+    def tour_of_studies(self, ask):
+        many, csv_type = '/v1/studies', {'Content-Type': 'text/csv'}
+        one = many + '/{id}'
+        header = ','.join(SIDE)
+        cohort = f'{header}\n7,22,31,10,8,5,403.5\n7,22,31,10,8,5,598.5\n7,5,31,10,8,5,200\n'
+        design = {
+            'name': 'tour',
+            'design': {'kind': 'full'},
+            'factors': [{'key': 'F', 'levels': [599.1, 599.2]}],
+            'case': side(F=None),
+        }
+        made = ask('POST', many, many, cohort.encode(), csv_type).json()['links']['self']
+        for body, headers in ((b'{', JSON), (b'{}', JSON), (b'x', csv_type), (b'x', {})):
+            ask('POST', many, many, body, headers)
+        too_large = {'Content-Length': str(1024 * 1024 + 1), 'Expect': '100-continue'}
+        ask('POST', many, many, b' ' * 10, {**JSON, **too_large})
+        eventually(lambda: self.service.get(made).json()['status'] == 'finished', made)
+        tag = ask('GET', made, one).headers['ETag']
+        ask('GET', made, one, headers={'If-None-Match': tag})
+        for query in ('', '?limit=1', '?limit=0'):
+            ask('GET', many + query, many)
+        hanging = ask('POST', many, many, design).json()['links']['self']
+        for path in (made, hanging):
+            for accept in ('application/json', 'text/csv', 'image/png'):
+                ask('GET', path + '/results', one + '/results', headers={'Accept': accept})
+        eventually(lambda: self.service.get(hanging).json()['points']['running'], hanging)
+        ask('DELETE', hanging, one)
+        ask('POST', hanging + '/cancel', one + '/cancel')
+        ask('POST', made + '/cancel', one + '/cancel')
+        ask('DELETE', made, one)
+        for suffix, method in (('', 'GET'), ('', 'DELETE'), ('/cancel', 'POST'), ('/results', 'GET')):
+            ask(method, made + suffix, one + suffix)
 
     def test_every_answer_fits_the_contract(self):
         asked = self.tour()

@@ -4,11 +4,13 @@
 the sample configuration are those of the program."""
 import os
 import re
+import shutil
 import subprocess
 import tempfile
 import unittest
 
-from service import HERE, PATIENCE_S, PROGRAM, PROXY, Service
+from emulator_file import write_emulator
+from service import HERE, PATIENCE_S, PROGRAM, PROXY, Service, side
 
 ROOT = os.path.join(HERE, '../..')
 
@@ -25,10 +27,10 @@ def curl_lines():
 
 def route_of(line):
     path = re.search(r'"\$ISCHIA(/[^"?]*)', line).group(1)
-    path = re.sub(r'\$(ID|RUNNING)', '{id}', path)
+    path = re.sub(r'\$(ID|RUNNING|STUDY)', '{id}', path)
     if '-X' in line:
         return re.search(r'-X (\w+)', line).group(1), path
-    return ('POST' if ' -d ' in line else 'GET'), path
+    return ('POST' if ' -d ' in line or ' --data-binary ' in line else 'GET'), path
 
 
 class Docs(unittest.TestCase):
@@ -43,31 +45,49 @@ class Docs(unittest.TestCase):
         }
         self.assertEqual(routes, {route_of(line) for line in curl_lines()})
 
+    def study(self, service):
+        design = {
+            'name': 'docs',
+            'design': {'kind': 'full'},
+            'factors': [{'key': 'F', 'levels': [599, 599.5]}],
+            'case': side(F=None),
+        }
+        return service.ask('POST', '/v1/studies', design).json()['id']
+
     def test_every_curl_line_works(self):
-        with Service() as service, tempfile.TemporaryDirectory() as folder:
-            service.until_ready()
-            environment = {
-                **os.environ,
-                'ISCHIA': service.origin,
-                'CURL_HOME': folder,
-                'ID': service.submit(F=250.5, subject='P-017', side='left')['id'],
-                'RUNNING': service.submit(wait=0, F=599)['id'],
-            }
-            if PROXY:  # as a user would: once, for all that follow
-                with open(os.path.join(folder, '.curlrc'), 'w', encoding='utf-8') as file:
-                    file.write(service.curl_options())
-            lines = sorted(curl_lines(), key=lambda line: '/cancel' not in line)
-            for line in lines:
-                done = subprocess.run(
-                    ['bash', '-c', line],
-                    env=environment,
-                    cwd=folder,
-                    timeout=PATIENCE_S,
-                    capture_output=True,
-                    text=True,
-                )
-                self.assertEqual(done.returncode, 0, f'{line}\n{done.stderr}')
-            self.assertTrue(os.path.getsize(os.path.join(folder, 'report.html')) > 0)
+        with tempfile.TemporaryDirectory() as folder:
+            emulator = os.path.join(folder, 'emulator.txt')
+            write_emulator(emulator)
+            with Service('--emulator', emulator) as service:
+                service.until_ready()
+                self.run_lines(service, folder)
+
+    def run_lines(self, service, folder):
+        environment = {
+            **os.environ,
+            'ISCHIA': service.origin,
+            'CURL_HOME': folder,
+            'ID': service.submit(F=250.5, subject='P-017', side='left')['id'],
+            'RUNNING': service.submit(wait=0, F=599)['id'],
+            'STUDY': self.study(service),
+        }
+        shutil.copy(os.path.join(ROOT, 'examples/table2.csv'), folder)
+        shutil.copy(os.path.join(ROOT, 'examples/design_table1_composite.json'), folder)
+        if PROXY:  # as a user would: once, for all that follow
+            with open(os.path.join(folder, '.curlrc'), 'w', encoding='utf-8') as file:
+                file.write(service.curl_options())
+        lines = sorted(curl_lines(), key=lambda line: ('/cancel' not in line, 'DELETE' in line))
+        for line in lines:
+            done = subprocess.run(
+                ['bash', '-c', line],
+                env=environment,
+                cwd=folder,
+                timeout=PATIENCE_S,
+                capture_output=True,
+                text=True,
+            )
+            self.assertEqual(done.returncode, 0, f'{line}\n{done.stderr}')
+        self.assertTrue(os.path.getsize(os.path.join(folder, 'report.html')) > 0)
 
     def test_the_manual_lists_the_options_of_the_program(self):
         printed = subprocess.run(

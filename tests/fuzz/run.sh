@@ -8,7 +8,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 seconds=${1:-20}
 [ $# -gt 0 ] && shift
-targets=${*:-case_json cds config csv fhir field_blob form frame hl7 query result_json}
+targets=${*:-case_json cds config csv fhir field_blob form frame hl7 query result_json study}
 [ -d build-fuzz ] || CC=clang meson setup build-fuzz -Dfuzz=true -Dbuildtype=debugoptimized \
   -Db_sanitize=address,undefined -Db_lundef=false >/dev/null
 for target in $targets; do

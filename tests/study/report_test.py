@@ -75,27 +75,30 @@ class Report(unittest.TestCase):
             cls.data,
         )
 
+        cls.out = cls.path / "out"
+        cls.make(cls.out)
+        cls.page = (cls.out / "VALIDATION.md").read_text()
+
     @classmethod
     def tearDownClass(cls):
         cls.folder.cleanup()
 
-    def make(self, out, status=0):
+    @classmethod
+    def make(cls, out, status=0):
         return run(
             sys.executable,
             VALIDATION / "make.py",
             "--program",
             PROGRAM,
             "--data",
-            self.data,
+            cls.data,
             "--out",
             out,
             status=status,
         )
 
     def test_the_page_says_what_the_files_say(self):
-        out = self.path / "out"
-        self.make(out)
-        page = (out / "VALIDATION.md").read_text()
+        out, page = self.out, self.page
         for words in (
             "26 of 26 sides converged",
             "**2106 of 2187** solves converged",
@@ -126,14 +129,39 @@ class Report(unittest.TestCase):
             root = ElementTree.parse(out / "validation" / name).getroot()
             self.assertTrue(root.find("{http://www.w3.org/2000/svg}title").text)
 
+    def test_the_page_says_what_has_not_been_run(self):
+        page = self.page
+        missing = page.split("## What has not been run yet")[1].split("\n## ")[0]
+        for name in ("cohort_as_published", "table1_as_published", "sobol_default"):
+            self.assertIn(f"`{name}`", missing)
+        self.assertIn("12 of 14 readings", missing)
+        for name in ("cohort_default", "table1_default"):
+            self.assertNotIn(f"`{name}`", missing)
+
+    def test_the_leading_effects_are_said(self):
+        page = self.page
+        self.assertIn("Table 3 prints μM > R2 > F > R1", page)
+        self.assertIn("- default: μM > R2 > F > R1; the order of Table 3, with its signs.", page)
+        self.assertIn("Not converged: 81 `diverged_step`", page)
+
+    def test_one_command_makes_what_is_missing(self):
+        run_all = [sys.executable, VALIDATION / "run.py", "--program", PROGRAM]
+        run_all += ["--work", self.path / "work", "--data", self.path / "all"]
+        run_all += ["--out", self.path / "run", "--only", "cohort_default,cohort_as_published"]
+        listed = run(*run_all, "--list").stdout
+        self.assertEqual(listed.count("to do"), 2)
+        run(*run_all)
+        self.assertEqual(run(*run_all, "--list").stdout.count("kept"), 2)
+        page = (self.path / "run/VALIDATION.md").read_text()
+        self.assertEqual(page.count("26 of 26 sides converged"), 2)
+        # what is kept and of this version is not made again
+        self.assertNotIn("cohort_default", run(*run_all).stderr)
+
     def test_the_same_files_give_the_same_bytes(self):
-        for name in ("one", "two"):
-            self.make(self.path / name)
-        for path in (self.path / "one").rglob("*.*"):
-            self.assertEqual(
-                path.read_bytes(),
-                (self.path / "two" / path.relative_to(self.path / "one")).read_bytes(),
-            )
+        self.make(self.path / "again")
+        for path in self.out.rglob("*.*"):
+            again = self.path / "again" / path.relative_to(self.out)
+            self.assertEqual(path.read_bytes(), again.read_bytes())
 
     def test_a_changed_file_stops_the_run(self):
         kept = self.data / "cohort_default.csv.gz"

@@ -145,6 +145,20 @@ class Designs(InTemporaryFolder):
             ],
         )
 
+    def test_a_named_model_is_chosen_for_a_design_that_does_not_say(self):
+        factors = [{"key": "F", "levels": [200, 300]}]
+        case = {"R1": 7, "R2": 20, "eM": 30, "eF": 10, "muM": 5, "muF": 5}
+        plain = self.design(factors=factors, case=case)
+        run("factorial", plain, "-o", self.path / "out.csv", "-q", "--model", "as-published")
+        # another model is another study: its journal is not gone on with
+        run("factorial", plain, "-o", self.path / "out.csv", "-q", status=2)
+        named = self.design(factors=factors, case={**case, "model": "as-published"})
+        run("factorial", named, "-o", self.path / "out.csv", "-q")  # the same study, said otherwise
+        said = run("factorial", named, "--model", "default", "--points", status=2).stderr
+        self.assertIn("model is given more than once", said)
+        said = run("factorial", plain, "--model", "printed", "--points", status=2).stderr
+        self.assertIn("default, as-published", said)
+
     def test_a_missing_input_is_asked_for(self):
         design = self.design(factors=[{"key": "F", "levels": [200, 300]}])
         self.assertIn("muM", run("factorial", design, "--points", status=2).stderr)
@@ -526,7 +540,7 @@ class Help(unittest.TestCase):
         listed = run("--help").stdout
         for command in ("factorial", "merge", "emulate", "compare"):
             self.assertIn(command, listed)
-            self.assertIn("usage: ischia study " + command, run(command, "--help").stdout)
+            self.assertIn("Usage: ischia study " + command, run(command, "--help").stdout)
         run(status=2)
         self.assertIn('no command "fit"', run("fit", status=2).stderr)
 

@@ -39,6 +39,19 @@ static void tables_are_complete(void **state)
     for (int i = 0; i < ISCHIA_RESOLUTION_COUNT; i++) assert_non_null(ischia_resolution_names[i]);
 }
 
+static void every_preset_is_a_model_that_can_be_solved(void **state)
+{
+    (void)state;
+    assert_int_equal(ischia_preset_count, 2);
+    assert_string_equal(ischia_presets[1].name, "as-published");
+    assert_true(ischia_presets[1].option[ISCHIA_BULK_RATIO] == 30);
+    for (size_t i = 0; i < ischia_preset_count; i++) {
+        struct ischia_case c = row_1R();
+        memcpy(c.option, ischia_presets[i].option, sizeof c.option);
+        assert_true(ischia_case_is_valid(&c));
+    }
+}
+
 static void a_default_case_misses_all_inputs(void **state)
 {
     (void)state;
@@ -111,6 +124,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tables_are_complete),
+        cmocka_unit_test(every_preset_is_a_model_that_can_be_solved),
         cmocka_unit_test(a_default_case_misses_all_inputs),
         cmocka_unit_test(a_row_of_table_2_is_valid_without_warning),
         cmocka_unit_test(faults_name_the_number_and_what_is_wrong),

@@ -32,7 +32,7 @@ static struct design_points points_of(const struct design *d)
 {
     struct design_points p;
     assert_true(design_is_valid(d));
-    assert_int_equal(design_points_init(&p, d, NULL), ISCHIA_OK);
+    assert_int_equal(design_points_init(&p, d, DESIGN_ROWS_MAX, NULL), ISCHIA_OK);
     return p;
 }
 
@@ -178,7 +178,17 @@ static void a_design_beyond_the_limit_is_refused(void **state)
     static const char *const name[] = {"R1", "R2", "eM", "eF", "muM", "muF", "F"};
     struct design_points p;
     for (int f = 0; f < 7; f++) add_factor(&d, name[f], 8, level);
-    assert_int_equal(design_points_init(&p, &d, NULL), ISCHIA_E_LIMIT);
+    assert_int_equal(design_points_init(&p, &d, DESIGN_ROWS_MAX, NULL), ISCHIA_E_LIMIT);
+    /* 8^7 combinations, of which one in 2^4 would be kept: too many to look at for 1000 rows */
+    d.modulus = 2;
+    d.generator_count = 4;
+    assert_int_equal(design_points_init(&p, &d, 1000, NULL), ISCHIA_E_LIMIT);
+    d = seven_factors(DESIGN_SOBOL);
+    d.points = DESIGN_ROWS_MAX;
+    assert_int_equal(design_points_init(&p, &d, 1000, NULL), ISCHIA_E_LIMIT);
+    d.points = 1000;
+    assert_int_equal(design_points_init(&p, &d, 1000, NULL), ISCHIA_OK);
+    design_points_finish(&p);
 }
 
 int main(void)

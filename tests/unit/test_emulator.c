@@ -32,7 +32,7 @@ static struct design table_1(void)
 static size_t coordinates(const struct design *d, double **ret_x)
 {
     struct design_points points;
-    assert_int_equal(design_points_init(&points, d, NULL), ISCHIA_OK);
+    assert_int_equal(design_points_init(&points, d, DESIGN_ROWS_MAX, NULL), ISCHIA_OK);
     const size_t n = points.count;
     *ret_x = calloc(n * 7, sizeof(double));
     assert_non_null(*ret_x);

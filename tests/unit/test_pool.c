@@ -32,6 +32,8 @@ struct host {
     pthread_cond_t changed;
     const char *job[JOBS_MAX];
     int jobs, given, ends, progress, ticks;
+    int yielding; /* the first jobs yield */
+    int pressing;
     int notes[POOL_NOTE_KIND_COUNT];
     int last_pid;
     char last_failure[400];
@@ -55,11 +57,22 @@ static bool next_job(void *context, struct pool_job *ret)
     lock(host);
     const bool has = host->given < host->jobs;
     if (has) {
-        *ret = (struct pool_job){.attempt = 1, .case_json = strdup(host->job[host->given])};
+        *ret = (struct pool_job){.attempt = 1,
+                                 .yields = host->given < host->yielding,
+                                 .case_json = strdup(host->job[host->given])};
         ret->id.byte[0] = (unsigned char)++host->given;
     }
     unlock(host);
     return has;
+}
+
+static int64_t pressing(void *context)
+{
+    struct host *host = context;
+    lock(host);
+    const int64_t waiting = host->pressing;
+    unlock(host);
+    return waiting;
 }
 
 static void on_progress(void *context, const struct pool_job *job,
@@ -156,7 +169,13 @@ static const char *const plain_command[] = {FAKE_WORKER, NULL};
 static void start(struct host *host, const struct pool_options *options)
 {
     struct ischia_error err = {0};
-    const struct pool_host callbacks = {host, next_job, on_progress, on_outcome, on_note, on_tick};
+    const struct pool_host callbacks = {.context = host,
+                                        .next_job = next_job,
+                                        .pressing = pressing,
+                                        .on_progress = on_progress,
+                                        .on_outcome = on_outcome,
+                                        .on_note = on_note,
+                                        .on_tick = on_tick};
     (void)pthread_mutex_init(&host->lock, NULL);
     (void)pthread_cond_init(&host->changed, NULL);
     if (pool_create(options, &callbacks, &host->pool, &err) != ISCHIA_OK)
@@ -315,6 +334,58 @@ static void test_cancel_ends_the_process(void **state)
     stop(&host);
 }
 
+/* Two solves that yield keep both workers; a job that may not wait comes. */
+static void test_the_latest_solve_that_yields_makes_room(void **state)
+{
+    (void)state;
+    struct host host = {
+        .job = {"{\"do\":\"hang\"}", "{\"do\":\"hang\"}", "{\"n\":4}"}, .jobs = 1, .yielding = 2};
+    struct pool_options options = options_with(plain_command);
+    options.solve_workers = 2;
+    start(&host, &options);
+    await(&host, &host.given, 1);
+    await(&host, &host.ticks, host.ticks + 1); /* the second begins later, for every clock */
+    lock(&host);
+    host.jobs = 2;
+    unlock(&host);
+    await(&host, &host.given, 2);
+    await(&host, &host.notes[POOL_NOTE_READY], 2);
+    await(&host, &host.ticks, host.ticks + 3); /* nothing presses: nothing happens */
+    assert_int_equal(host.ends, 0);
+    lock(&host);
+    host.jobs = 3;
+    host.pressing = 1;
+    unlock(&host);
+    pool_wake(host.pool);
+    await(&host, &host.ends, 1);
+    assert_int_equal(host.ended[0].end, POOL_YIELDED);
+    assert_int_equal(host.ended[0].id, 2);
+    await(&host, &host.given, 3);
+    lock(&host);
+    host.pressing = 0;
+    unlock(&host);
+    await(&host, &host.ends, 2);
+    assert_int_equal(host.ended[1].end, POOL_RESULT);
+    assert_int_equal(host.ended[1].id, 3);
+    struct pool_stats stats;
+    pool_stats(host.pool, &stats);
+    assert_int_equal(stats.yielded, 1);
+    assert_int_equal(stats.died, 0); /* a worker that made room is no failure */
+    stop(&host);
+}
+
+/* One that does not yield is left alone, whoever waits. */
+static void test_what_does_not_yield_stays(void **state)
+{
+    (void)state;
+    struct host host = {.job = {"{\"do\":\"slow\",\"ms\":600}", "{}"}, .jobs = 2, .pressing = 5};
+    const struct pool_options options = options_with(plain_command);
+    run_jobs(&host, &options);
+    assert_int_equal(host.ended[0].end, POOL_RESULT);
+    assert_int_equal(host.ended[1].end, POOL_RESULT);
+    stop(&host);
+}
+
 static void test_drain_takes_back_what_runs(void **state)
 {
     (void)state;
@@ -470,6 +541,8 @@ int main(void)
         cmocka_unit_test(test_babble),
         cmocka_unit_test(test_last_words_count),
         cmocka_unit_test(test_cancel_ends_the_process),
+        cmocka_unit_test(test_the_latest_solve_that_yields_makes_room),
+        cmocka_unit_test(test_what_does_not_yield_stays),
         cmocka_unit_test(test_drain_takes_back_what_runs),
         cmocka_unit_test(test_drain_lets_what_runs_end),
         cmocka_unit_test(test_drawings_do_not_wait_for_solves),

@@ -24,7 +24,7 @@ struct room {
     struct store *store;
     struct events *events;
     struct queue *queue;
-    int finished, store_errors;
+    int finished, points, store_errors;
 };
 
 static const char *const command[] = {FAKE_WORKER, NULL};
@@ -38,6 +38,14 @@ static void on_finished(void *context, const struct uuid *id, enum queue_state s
     (void)end;
     (void)detail;
     if (wall_ms >= 0) (void)__atomic_add_fetch(&room->finished, 1, __ATOMIC_SEQ_CST);
+}
+
+static void on_point(void *context, enum queue_state state, enum pool_end end, int64_t wall_ms)
+{
+    struct room *room = context;
+    (void)end;
+    (void)wall_ms;
+    if (queue_is_final(state)) (void)__atomic_add_fetch(&room->points, 1, __ATOMIC_SEQ_CST);
 }
 
 static void on_store_error(void *context, const struct ischia_error *err)
@@ -58,8 +66,10 @@ static void open_queue(struct room *room, int queued_max)
                                                          .backoff_max_ms = 50,
                                                          .solve_deadline_ms = 3000},
                                                 .queued_max = queued_max};
-    const struct queue_watcher watcher = {
-        .context = room, .on_finished = on_finished, .on_store_error = on_store_error};
+    const struct queue_watcher watcher = {.context = room,
+                                          .on_finished = on_finished,
+                                          .on_point = on_point,
+                                          .on_store_error = on_store_error};
     if (store_open(&options, &room->store, &err) != ISCHIA_OK) fail_msg("%s", err.message);
     assert_int_equal(events_create(&room->events, &err), ISCHIA_OK);
     if (queue_create(room->store, room->events, &queue_options, &watcher, &room->queue, &err) !=
@@ -138,6 +148,16 @@ static void await_state(struct room *room, const struct uuid *id, enum queue_sta
     }
 }
 
+/* What is stored is told a moment later. */
+static void await_told(const int *counter, int count)
+{
+    for (int waited = 0; __atomic_load_n(counter, __ATOMIC_SEQ_CST) < count; waited += 5) {
+        assert_true(waited < WAIT_MS);
+        rest();
+    }
+    assert_int_equal(__atomic_load_n(counter, __ATOMIC_SEQ_CST), count);
+}
+
 /* Runs one case to its end and gives its document (result or problem), to be freed. */
 static char *run(struct room *room, const char *case_json, enum queue_state end,
                  int64_t expected_attempts)
@@ -174,7 +194,7 @@ static void test_ends_of_all_kinds(void **state)
     /* "succeeded" is only ever said of a result that holds */
     expect(room, "{\"do\":\"bad_result\"}", QUEUE_FAILED, 2, "did not hold");
     expect(room, "{\"do\":\"unconverged\"}", QUEUE_FAILED, 2, "did not hold");
-    assert_int_equal(__atomic_load_n(&room->finished, __ATOMIC_SEQ_CST), 7);
+    await_told(&room->finished, 7);
 }
 
 static void wake(void *context) { (void)__atomic_add_fetch((int *)context, 1, __ATOMIC_SEQ_CST); }
@@ -279,6 +299,110 @@ static void test_draining_accepts_nothing(void **state)
     open_queue(room, 0);
 }
 
+/* ------------------------------------------------------------------------------- studies */
+
+static struct uuid accept_study(struct room *room, const char *const *cases, size_t count)
+{
+    struct ischia_error err = {0};
+    struct store_study_accepted accepted = {0};
+    struct store_study_point_new point[8] = {0};
+    assert_true(count <= 8);
+    for (size_t i = 0; i < count; i++) {
+        point[i] = (struct store_study_point_new){.cells_json = "[]", .case_json = cases[i]};
+        queue_case_key(cases[i], point[i].case_key);
+    }
+    const struct store_study_new what = {
+        .name = "s", .columns_json = "[]", .client = "", .count = count, .point = point};
+    if (queue_accept_study(room->queue, &what, &accepted, &err) != ISCHIA_OK)
+        fail_msg("%s", err.message);
+    assert_int_equal(accepted.acceptance, STORE_ACCEPTED);
+    return accepted.id;
+}
+
+static struct store_study study_of(struct room *room, const struct uuid *id)
+{
+    struct store_study study = {0};
+    struct ischia_error err;
+    enum store_answer answer;
+    assert_int_equal(store_study_get(room->store, id, &study, &answer, &err), ISCHIA_OK);
+    assert_int_equal(answer, STORE_DONE);
+    struct store_study counts = study;
+    store_study_finish(&study);
+    counts.name = counts.columns_json = counts.responses_json = NULL;
+    return counts;
+}
+
+static void await_points(struct room *room, const struct uuid *id, enum queue_state state,
+                         int64_t count)
+{
+    for (int waited = 0; study_of(room, id).count[state] != count; waited += 5) {
+        if (waited > WAIT_MS)
+            fail_msg("%lld points %s, not %lld", (long long)study_of(room, id).count[state],
+                     queue_state_names[state], (long long)count);
+        rest();
+    }
+}
+
+static void test_points_end_in_all_ways(void **state)
+{
+    struct room *room = *state;
+    static const char *const cases[] = {"{\"n\":7}", "{\"do\":\"diverge\"}", "{\"do\":\"crash\"}",
+                                        "{\"n\":8}"};
+    const struct uuid id = accept_study(room, cases, 4);
+    await_points(room, &id, QUEUE_SUCCEEDED, 2);
+    await_points(room, &id, QUEUE_FAILED, 2);
+    assert_true(study_of(room, &id).finished_ms > 0);
+    await_told(&room->points, 4);
+    assert_int_equal(__atomic_load_n(&room->finished, __ATOMIC_SEQ_CST), 0); /* no assessments */
+}
+
+/* The only worker is kept by a study; what comes in is solved all the same, and then the study goes
+ * on with nothing counted against its point. */
+static void test_an_assessment_does_not_wait_for_a_study(void **state)
+{
+    struct room *room = *state;
+    static const char *const cases[] = {"{\"do\":\"slow\",\"ms\":2500,\"n\":1}", "{\"n\":2}"};
+    const struct uuid id = accept_study(room, cases, 2);
+    await_points(room, &id, QUEUE_RUNNING, 1);
+    const struct store_accepted clinic = accept(room, "{\"n\":3}");
+    await_state(room, &clinic.id, QUEUE_SUCCEEDED);
+    assert_int_equal(study_of(room, &id).count[QUEUE_SUCCEEDED], 0);
+    struct pool_stats stats;
+    pool_stats(queue_pool(room->queue), &stats);
+    assert_int_equal(stats.yielded, 1);
+    await_points(room, &id, QUEUE_SUCCEEDED, 2);
+    assert_int_equal(stats.died, 0);
+}
+
+static void test_a_cancelled_study_stops(void **state)
+{
+    struct room *room = *state;
+    static const char *const cases[] = {"{\"do\":\"hang\"}", "{\"n\":2}"};
+    struct ischia_error err;
+    enum store_answer answer;
+    const struct uuid id = accept_study(room, cases, 2);
+    await_points(room, &id, QUEUE_RUNNING, 1);
+    assert_int_equal(queue_cancel_study(room->queue, &id, &answer, &err), ISCHIA_OK);
+    assert_int_equal(answer, STORE_DONE);
+    const struct store_study study = study_of(room, &id);
+    assert_int_equal(study.count[QUEUE_CANCELLED], 2);
+    assert_true(study.cancelled && study.finished_ms > 0);
+    const struct store_accepted next = accept(room, "{\"n\":3}");
+    await_state(room, &next.id, QUEUE_SUCCEEDED); /* the worker is free again */
+    assert_int_equal(study_of(room, &id).count[QUEUE_CANCELLED], 2);
+}
+
+static void test_a_study_survives_a_restart(void **state)
+{
+    struct room *room = *state;
+    static const char *const cases[] = {"{\"do\":\"slow\",\"ms\":1500,\"n\":1}", "{\"n\":2}"};
+    const struct uuid id = accept_study(room, cases, 2);
+    await_points(room, &id, QUEUE_RUNNING, 1);
+    close_queue(room, 0);
+    open_queue(room, 0);
+    await_points(room, &id, QUEUE_SUCCEEDED, 2);
+}
+
 /* Out of descriptors: what is open goes on; what needs a new one waits for better times. */
 static void test_out_of_descriptors(void **state)
 {
@@ -314,6 +438,10 @@ int main(void)
         QUEUE_TEST(test_full_queue_and_cache),
         QUEUE_TEST(test_restart_goes_on_where_it_was),
         QUEUE_TEST(test_draining_accepts_nothing),
+        QUEUE_TEST(test_points_end_in_all_ways),
+        QUEUE_TEST(test_an_assessment_does_not_wait_for_a_study),
+        QUEUE_TEST(test_a_cancelled_study_stops),
+        QUEUE_TEST(test_a_study_survives_a_restart),
         QUEUE_TEST(test_out_of_descriptors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

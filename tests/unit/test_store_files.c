@@ -264,7 +264,7 @@ static void test_old_schema_is_migrated(void **state)
     store_close(room->store);
     open_room(room); /* and once more: nothing left to do */
     assert_int_equal(state_of(room->store, &old), QUEUE_QUEUED);
-    assert_int_equal(store_schema_version(), 3);
+    assert_int_equal(store_schema_version(), 4);
 }
 
 static void test_backup_and_restore(void **state)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef ISCHIA_SERVER_CLI_COHORT_ROWS_H
-#define ISCHIA_SERVER_CLI_COHORT_ROWS_H
+#ifndef ISCHIA_API_COHORT_ROWS_H
+#define ISCHIA_API_COHORT_ROWS_H
 
 #include <stdbool.h>
 
@@ -17,12 +17,6 @@ struct cohort_columns {
     char *header;                     /* the columns as they are written again                    */
 };
 
-/* Values for what a file has no column for; NULL: the usual default. */
-struct cohort_defaults {
-    const char *resolution;
-    const char *model;
-};
-
 /* Reads the header row. ISCHIA_E_INPUT, and a fault for each, when a column for one of the seven is
  * missing, one is there twice, or one has the name of a result column. */
 ISCHIA_MUST_CHECK enum ischia_code
@@ -30,11 +24,12 @@ cohort_columns_init(struct cohort_columns *ret, const struct csv_row *row,
                     struct doc_faults *faults, struct ischia_error *err);
 void cohort_columns_finish(struct cohort_columns *columns);
 
-/* Reads a row: its fields as they are written again (ret_echo, the caller's to free) and its case.
- * Faults are added for what is wrong with it. ISCHIA_E_MEMORY. */
+/* Reads a row: its fields as they are written again (ret_echo, the caller's to free) and its case,
+ * over defaults for what the file has no column for. Faults are added for what is wrong with it.
+ * ISCHIA_E_MEMORY. */
 ISCHIA_MUST_CHECK enum ischia_code
-cohort_row_read(const struct cohort_columns *columns, const struct cohort_defaults *defaults,
-                const struct csv_row *row, char **ret_echo, struct ischia_case *ret,
+cohort_row_read(const struct cohort_columns *columns, const struct case_doc_defaults *defaults,
+                const struct csv_row *row, char **ret_echo, struct ischia_request *ret,
                 struct doc_faults *faults, struct ischia_error *err);
 
 #endif

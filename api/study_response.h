@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef ISCHIA_SERVER_CLI_STUDY_RESPONSE_H
-#define ISCHIA_SERVER_CLI_STUDY_RESPONSE_H
+#ifndef ISCHIA_API_STUDY_RESPONSE_H
+#define ISCHIA_API_STUDY_RESPONSE_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
 #include "api/text.h"
-#include "server/cli/crew.h"
 #include "solver/case.h"
 #include "solver/result.h"
 
@@ -26,10 +25,13 @@ extern const int study_response_count;
 
 int study_response_find(const char *name); /* -1: no such response */
 
-/* "status,reason,value,..." of one row, no line end. Not converged: the numbers that need a
- * converged state stay empty. */
-void study_response_put(struct text_out *out, const struct crew_answer *answer, const int *chosen,
-                        int count);
+/* A response of a result; NaN for one that needs a converged state when there is none. */
+double study_response_value(int response, const struct ischia_result *result);
+
+/* "status,reason,value,..." of one row, no line end. result: NULL when there is none, and then all
+ * numbers stay empty; word and detail: why, "word: detail" or one of them. */
+void study_response_put(struct text_out *out, const struct ischia_result *result, const char *word,
+                        const char *detail, const int *chosen, int count);
 
 /* The same for a case that was never solved because it is not valid. */
 void study_response_put_refused(struct text_out *out, const struct ischia_case *c, int count);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "server/cli/study_plan.h"
+#include "api/study_plan.h"
 
 #include <errno.h>
 #include <math.h>
@@ -7,12 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "api/case_doc.h"
 #include "api/csv.h"
 #include "api/json.h"
-#include "server/cli/files.h"
 
-static const struct json_limits plan_limits = {1024 * 1024, 16, 4096};
+static const struct json_limits plan_limits = {STUDY_PLAN_BYTES_MAX, 16, 4096};
 
 /* ---- small readers: each adds a fault and keeps the old value when the member is wrong ---- */
 
@@ -220,38 +218,42 @@ static void read_rule(const struct reader *plan, struct design *d)
 
 /* ---- what is not a factor ---- */
 
-static bool is_missing_factor(const struct ischia_fault *fault, const struct design *d)
+static bool is_factor(const struct design *d, const char *pointer)
 {
-    if (strcmp(fault->code, "missing") != 0) return false;
     for (int f = 0; f < d->factor_count; f++)
         if (!d->factor[f].is_option &&
-            strcmp(fault->pointer + 1, ischia_params[d->factor[f].index].key) == 0)
+            strcmp(pointer + 1, ischia_params[d->factor[f].index].key) == 0)
             return true;
     return false;
 }
 
-static void read_base(const struct reader *in, struct design *d)
+/* The faults of "case", but for what the factors give. */
+static void add_case_faults(struct doc_faults *faults, const struct doc_faults *found,
+                            const struct design *d)
+{
+    for (size_t i = 0; i < found->count; i++) {
+        const struct ischia_fault *fault = &found->item[i];
+        char pointer[64];
+        (void)snprintf(pointer, sizeof pointer, "/case%s", fault->pointer);
+        if (strcmp(fault->code, "missing") != 0)
+            doc_faults_add(faults, pointer, fault->code, "%s", fault->detail);
+        else if (!is_factor(d, fault->pointer))
+            doc_faults_add(faults, pointer, "missing",
+                           "%s is not a factor, so \"case\" must give it", fault->pointer + 1);
+    }
+}
+
+static void read_base(const struct reader *in, const struct case_doc_defaults *defaults,
+                      struct study_plan *plan)
 {
     struct ischia_request request;
     struct doc_faults found;
     const struct json *object = member_of_type(in, "case", JSON_OBJECT);
-    ischia_request_init(&request);
     doc_faults_init(&found);
-    if (object != NULL) case_doc_read_value(&request, object, &found);
-    d->base = request.values;
-    for (size_t i = 0; i < found.count; i++) {
-        char pointer[64];
-        (void)snprintf(pointer, sizeof pointer, "/case%s", found.item[i].pointer);
-        if (!is_missing_factor(&found.item[i], d))
-            doc_faults_add(in->faults, pointer, found.item[i].code, "%s", found.item[i].detail);
-    }
-    for (int p = 0; object == NULL && p < ISCHIA_PARAM_COUNT; p++) {
-        struct ischia_fault fault = {.code = "missing"};
-        (void)snprintf(fault.pointer, sizeof fault.pointer, "/%s", ischia_params[p].key);
-        if (!is_missing_factor(&fault, d))
-            doc_faults_add(in->faults, "/case", "missing",
-                           "%s is not a factor, so \"case\" must give it", ischia_params[p].key);
-    }
+    case_doc_read_value_over(&request, defaults, object, &found);
+    plan->design.base = request.values;
+    memcpy(plan->preset, request.preset, sizeof plan->preset);
+    add_case_faults(in->faults, &found, &plan->design);
 }
 
 static void read_responses(const struct reader *in, struct study_plan *plan)
@@ -273,7 +275,8 @@ static void read_responses(const struct reader *in, struct study_plan *plan)
     }
 }
 
-static void read_plan(const struct json *root, struct study_plan *plan, struct doc_faults *faults)
+static void read_plan(const struct json *root, const struct case_doc_defaults *defaults,
+                      struct study_plan *plan, struct doc_faults *faults)
 {
     static const char *const known[] = {"name", "description", "design", "factors",
                                         "case", "responses",   NULL};
@@ -292,7 +295,7 @@ static void read_plan(const struct json *root, struct study_plan *plan, struct d
     }
     read_factors(&in, &plan->design);
     read_rule(&in, &plan->design);
-    read_base(&in, &plan->design);
+    read_base(&in, defaults, plan);
     read_responses(&in, plan);
     if (faults->count == 0 && !design_is_valid(&plan->design))
         doc_faults_add(
@@ -300,35 +303,28 @@ static void read_plan(const struct json *root, struct study_plan *plan, struct d
             plan->design.kind == DESIGN_MORRIS ? "\"paths\" and an even \"levels\"" : "\"points\"");
 }
 
-static void put_faults(struct text_out *out, const struct doc_faults *faults)
+static enum ischia_code make_points(struct study_plan *plan, size_t rows_max,
+                                    struct doc_faults *faults, struct ischia_error *err)
 {
-    for (size_t i = 0; i < faults->count; i++) {
-        text_put_string(out, faults->item[i].pointer);
-        text_put_string(out, ": ");
-        text_put_string(out, faults->item[i].detail);
-        text_put_string(out, "\n");
-    }
+    struct ischia_error why = {0};
+    const enum ischia_code code = design_points_init(&plan->points, &plan->design, rows_max, &why);
+    if (code == ISCHIA_OK) return ISCHIA_OK;
+    if (code != ISCHIA_E_LIMIT) return FAIL(err, code, "%s", why.message);
+    doc_faults_add(faults, "/design", "out_of_range", "%s", why.message);
+    return ISCHIA_OK;
 }
 
-enum ischia_code study_plan_init(struct study_plan *ret, const char *path,
-                                 struct text_out *ret_faults, struct ischia_error *err)
+enum ischia_code study_plan_read(struct study_plan *ret, const char *json, size_t length,
+                                 const struct case_doc_defaults *defaults, size_t rows_max,
+                                 struct doc_faults *faults, struct ischia_error *err)
 {
     struct study_plan plan = {.design = {.base = ischia_case_default()}};
-    struct doc_faults faults;
     struct json *root;
-    char *text;
-    size_t length;
-    doc_faults_init(&faults);
-    TRY(file_read(path, plan_limits.bytes_max, &text, &length, err));
-    const enum ischia_code code = json_parse(&root, text, length, &plan_limits, &faults, err);
-    free(text);
-    TRY(code);
-    read_plan(root, &plan, &faults);
+    TRY(json_parse(&root, json, length, &plan_limits, faults, err));
+    read_plan(root, defaults, &plan, faults);
     json_destroy(root);
-    put_faults(ret_faults, &faults);
-    CHECK(faults.count == 0, err, ISCHIA_E_INPUT, "%s is not a design that can be run", path);
-    TRY(design_points_init(&plan.points, &plan.design, err));
-    *ret = plan;
+    if (faults->count == 0) TRY(make_points(&plan, rows_max, faults, err));
+    if (faults->count == 0) *ret = plan;
     return ISCHIA_OK;
 }
 

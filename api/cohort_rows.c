@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "server/cli/cohort_rows.h"
+#include "api/cohort_rows.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -48,14 +48,15 @@ static int column_of(const struct cohort_columns *columns, const char *key)
 
 static void take_column(struct cohort_columns *columns, const char *name, struct doc_faults *faults)
 {
-    char buffer[64];
+    char buffer[64], pointer[DOC_POINTER_BYTES];
     const char *plain = trimmed(name, buffer);
     const char *key = meaning_of(plain);
+    (void)doc_pointer(pointer, sizeof pointer, "", plain);
     if (is_result_column(plain))
-        doc_faults_add(faults, plain, "not_allowed",
+        doc_faults_add(faults, pointer, "not_allowed",
                        "column %s is the name of a result column; rename or remove it", plain);
     if (key != NULL && column_of(columns, key) >= 0)
-        doc_faults_add(faults, plain, "duplicate", "column %s: %s is there more than once", plain,
+        doc_faults_add(faults, pointer, "duplicate", "column %s: %s is there more than once", plain,
                        key);
     columns->key[columns->count++] = key;
 }
@@ -63,10 +64,12 @@ static void take_column(struct cohort_columns *columns, const char *name, struct
 static void find_missing(const struct cohort_columns *columns, const struct csv_row *row,
                          struct doc_faults *faults)
 {
+    char pointer[DOC_POINTER_BYTES];
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
         const struct ischia_param_info *p = &ischia_params[i];
+        (void)doc_pointer(pointer, sizeof pointer, "", p->key);
         if (column_of(columns, p->key) < 0)
-            doc_faults_add(faults, p->key, "missing", "column %s is missing (or %s_%s)", p->key,
+            doc_faults_add(faults, pointer, "missing", "column %s is missing (or %s_%s)", p->key,
                            p->key, p->unit);
     }
     if (row->count == 1 && strpbrk(row->field[0], ";\t") != NULL)
@@ -102,26 +105,26 @@ void cohort_columns_finish(struct cohort_columns *columns)
     columns->header = NULL;
 }
 
-static void read_case(const struct cohort_columns *columns, const struct cohort_defaults *defaults,
-                      const struct csv_row *row, struct ischia_case *ret, struct doc_faults *faults)
+static void read_case(const struct cohort_columns *columns,
+                      const struct case_doc_defaults *defaults, const struct csv_row *row,
+                      struct ischia_request *ret, struct doc_faults *faults)
 {
-    struct ischia_request request;
     struct case_doc_fields fields;
-    case_doc_fields_init(&fields, &request, faults);
+    const struct case_doc_defaults missing = {
+        column_of(columns, "resolution") < 0 ? defaults->resolution : NULL,
+        column_of(columns, "model") < 0 ? defaults->model : NULL,
+    };
+    case_doc_fields_init(&fields, ret, faults);
+    case_doc_fields_set_defaults(&fields, &missing);
     for (int i = 0; i < columns->count && i < row->count; i++)
         if (columns->key[i] != NULL) case_doc_fields_set(&fields, columns->key[i], row->field[i]);
-    if (defaults->resolution != NULL && column_of(columns, "resolution") < 0)
-        case_doc_fields_set(&fields, "resolution", defaults->resolution);
-    if (defaults->model != NULL && column_of(columns, "model") < 0)
-        case_doc_fields_set(&fields, "model", defaults->model);
     case_doc_fields_end(&fields);
-    *ret = request.values;
 }
 
-enum ischia_code cohort_row_read(const struct cohort_columns *columns,
-                                 const struct cohort_defaults *defaults, const struct csv_row *row,
-                                 char **ret_echo, struct ischia_case *ret,
-                                 struct doc_faults *faults, struct ischia_error *err)
+enum ischia_code
+cohort_row_read(const struct cohort_columns *columns, const struct case_doc_defaults *defaults,
+                const struct csv_row *row, char **ret_echo, struct ischia_request *ret,
+                struct doc_faults *faults, struct ischia_error *err)
 {
     struct text_out out;
     text_out_init(&out);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-#include "server/cli/study_response.h"
+#include "api/study_response.h"
 
 #include <assert.h>
 #include <math.h>
@@ -63,34 +63,26 @@ static double value_of(const struct study_response *response, const struct ischi
 static void put_reason(struct text_out *out, const char *word, const char *detail)
 {
     char reason[320], printable[320];
-    (void)snprintf(reason, sizeof reason, "%s%s%s", word, detail[0] != '\0' ? ": " : "", detail);
+    (void)snprintf(reason, sizeof reason, "%s%s%s", word,
+                   word[0] != '\0' && detail[0] != '\0' ? ": " : "", detail);
     csv_put_text(out, text_printable(reason, printable, sizeof printable), false);
 }
 
-static void put_numbers(struct text_out *out, const struct crew_answer *answer, const int *chosen,
-                        int count)
+double study_response_value(int response, const struct ischia_result *result)
 {
-    const bool solved = answer->code == ISCHIA_OK;
-    for (int i = 0; i < count; i++) {
-        const struct study_response *response = &study_responses[chosen[i]];
-        const bool meant = solved && (response->always || ischia_result_converged(&answer->result));
-        csv_put_number(out, meant ? value_of(response, &answer->result) : (double)NAN, false);
-    }
+    const struct study_response *r = &study_responses[response];
+    return r->always || ischia_result_converged(result) ? value_of(r, result) : (double)NAN;
 }
 
-void study_response_put(struct text_out *out, const struct crew_answer *answer, const int *chosen,
-                        int count)
+void study_response_put(struct text_out *out, const struct ischia_result *result, const char *word,
+                        const char *detail, const int *chosen, int count)
 {
-    const struct ischia_numerics *numerics = &answer->result.numerics;
-    const bool solved = answer->code == ISCHIA_OK;
-    const bool succeeded = solved && ischia_result_converged(&answer->result);
+    const bool succeeded = result != NULL && ischia_result_converged(result);
     csv_put_text(out, succeeded ? "succeeded" : "failed", true);
-    if (solved) {
-        put_reason(out, ischia_reason_name(numerics->reason), succeeded ? "" : numerics->detail);
-    } else {
-        put_reason(out, ischia_code_name(answer->code), answer->message);
-    }
-    put_numbers(out, answer, chosen, count);
+    put_reason(out, word, succeeded ? "" : detail);
+    for (int i = 0; i < count; i++)
+        csv_put_number(out, result != NULL ? study_response_value(chosen[i], result) : (double)NAN,
+                       false);
 }
 
 void study_response_put_refused(struct text_out *out, const struct ischia_case *c, int count)

@@ -1,0 +1,128 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""POST /v1/estimates: numbers of the trained emulator, in the request; none where it knows nothing,
+and none without one."""
+import os
+import subprocess
+import tempfile
+import unittest
+
+from emulator_file import BOX, eps_max, write_emulator
+from service import JSON, PATIENCE_S, Service, admin, command_line, side
+
+INSIDE = side(R1=7, R2=40, eM=29, eF=22, muM=4, muF=5, F=300)
+
+
+class Estimates(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.path = os.path.join(cls.folder.name, 'emulator.txt')
+        write_emulator(cls.path)
+        cls.service = Service('--emulator', cls.path)
+        cls.service.until_ready()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.service.stop()
+        cls.folder.cleanup()
+
+    def ask(self, body, status=200):
+        answer = self.service.ask('POST', '/v1/estimates', body)
+        self.assertEqual(answer.status, status, answer.body)
+        return answer.json()
+
+    def codes(self, document):
+        return {(w['code'], w['pointer']) for w in document['warnings']}
+
+    def test_the_numbers_are_those_of_the_file(self):
+        for changes in ({}, {'R1': 5}, {'R1': 9, 'muM': 8}, {'F': 427.5, 'R1': 6.2}):
+            document = self.ask({**INSIDE, **changes})
+            value, half = eps_max({**INSIDE, **changes})
+            got = document['strain']['eps_max']
+            self.assertAlmostEqual(got['value'], value, places=12)
+            self.assertAlmostEqual(got['low'], value - half, places=12)
+            self.assertAlmostEqual(got['high'], value + half, places=12)
+
+    def test_it_says_that_it_is_an_estimate_and_whose(self):
+        document = self.ask(INSIDE)
+        self.assertEqual(document['kind'], 'estimate')
+        self.assertEqual(document['parameters'], INSIDE)
+        self.assertEqual(document['emulator']['rows'], 100)
+        self.assertEqual(len(document['emulator']['sha256']), 64)
+        self.assertEqual(self.codes(document), {('trial_emulator', '')})
+        self.assertNotIn('result', document)
+        self.assertNotIn('id', document)
+
+    def test_limits_of_nature_hold(self):
+        document = self.ask(INSIDE)
+        self.assertEqual(document['strain']['E_comp_max'], {'value': 0.49, 'low': 0.39, 'high': 0.5})
+        self.assertEqual(document['clusters']['both']['volume_mm3']['low'], 0)
+        # a threshold whose force is beyond the case's own is not reached
+        self.assertEqual(document['threshold_force_N']['shear']['value'], 250)
+        self.assertIsNone(self.ask({**INSIDE, 'F': 249})['threshold_force_N']['shear'])
+        self.assertIsNone(document['threshold_force_N']['compression'])  # not in the file
+
+    def test_outside_its_training_it_gives_none(self):
+        low, high = BOX['R1']
+        for changes, expected in (
+            ({'R1': low - 0.1}, {('outside_training', '/R1')}),
+            ({'R1': high + 0.1, 'muM': 9}, {('outside_training', '/R1'), ('outside_training', '/muM')}),
+            ({'model': 'as-published'}, {('other_model', '/model')}),
+            ({'skin': {'mu': 100}}, {('other_model', '/model')}),
+        ):
+            document = self.ask({**INSIDE, **changes})
+            for group in ('strain', 'clusters', 'seat', 'threshold_force_N'):
+                self.assertIsNone(document[group])
+            self.assertLessEqual(expected, self.codes(document))
+
+    def test_faults_are_those_of_an_assessment(self):
+        errors = self.ask({**INSIDE, 'muM': 80, 'muN': 1}, 422)['errors']
+        self.assertEqual({e['pointer'] for e in errors}, {'/muM', '/muN'})
+        self.assertEqual(self.service.ask('POST', '/v1/estimates', b'{', JSON).status, 400)
+        form = {'Content-Type': 'application/x-www-form-urlencoded'}
+        self.assertEqual(self.service.ask('POST', '/v1/estimates', b'R1=7', form).status, 415)
+
+    def test_nothing_is_stored_or_queued(self):
+        self.ask({**INSIDE, 'subject': 'P-9'})
+        self.assertEqual(self.service.get('/v1/assessments').json()['items'], [])
+        self.assertEqual(self.service.get('/v1/changes').json()['last_seq'], 0)
+
+
+class Installing(unittest.TestCase):
+    def test_without_one_there_are_none(self):
+        with Service() as service:
+            answer = service.ask('POST', '/v1/estimates', INSIDE)
+            self.assertEqual(answer.status, 404)
+            self.assertIn('No trained emulator is installed', answer.json()['detail'])
+
+    def test_a_damaged_one_is_refused_at_start(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, 'emulator.txt')
+            write_emulator(path)
+            with open(path, encoding='ascii') as file:
+                good = file.read()
+            for text, words in (
+                (good.replace('250', '251'), 'does not match its checksum'),
+                ('{}', 'does not begin as a trained emulator does'),
+            ):
+                with open(path, 'w', encoding='ascii') as file:
+                    file.write(text)
+                command = command_line(os.path.join(folder, 'state'), '--emulator', path)
+                done = subprocess.run(
+                    command, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+                )
+                self.assertEqual(done.returncode, 2)
+                self.assertIn(words, done.stderr)
+
+    def test_a_token_to_read_is_not_enough(self):
+        with tempfile.TemporaryDirectory() as state:
+            words = admin(state, 'token', 'create', 'name=x', 'scope=read').split()
+            token = {'Authorization': 'Bearer ' + next(w for w in words if len(w) > 40)}
+            with Service(state=state) as service:
+                self.assertEqual(service.ask('POST', '/v1/estimates', INSIDE, token).status, 403)
+                self.assertEqual(service.ask('POST', '/v1/estimates', INSIDE).status, 401)
+
+
+if __name__ == '__main__':
+    unittest.main()
