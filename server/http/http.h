@@ -53,6 +53,8 @@ struct http_request {
 
 /* The first value of a header, NULL when it was not sent. Valid as long as the request. */
 const char *http_request_header(const struct http_request *request, const char *name);
+/* How often a header was sent. */
+int http_request_header_count(const struct http_request *request, const char *name);
 
 enum { HTTP_HEADERS_MAX = 20, HTTP_ETAG_BYTES = 80, HTTP_ARENA_BYTES = 1024 };
 

@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A running ischiad for a test: its own state directory, a free port, a fake worker."""
+"""A running ischiad for a test: its own state directory, a free port, a fake worker.
+
+With TESTED_THROUGH=nginx every service stands behind nginx as deploy/nginx/ischia.conf has it:
+clients speak TLS with the proxy and show a token, and the daemon believes the proxy only.
+"""
 import http.client
 import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
+import unittest
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROGRAM = os.environ.get('ISCHIAD', os.path.join(HERE, '../../build/server/ischiad'))
@@ -17,7 +23,28 @@ JSON = {'Content-Type': 'application/json'}
 # How long a test waits for what must happen: no expectation of speed, only something that hangs
 # takes so long. The longest wait that the service itself grants is 60 s.
 PATIENCE_S = 240
+PROXY = os.environ.get('TESTED_THROUGH', '')
+if PROXY:
+    sys.path.append(os.path.join(HERE, '../proxy'))
+    import front
 SIDE = {'R1': 7.1, 'R2': 22.8, 'eM': 31, 'eF': 10, 'muM': 8, 'muF': 5, 'F': 258}
+
+
+def direct_only(reason):
+    """For a test of what the daemon does on a connection of its own."""
+    return unittest.skipIf(PROXY, f'not through a proxy: {reason}')
+
+
+class SecureConnection(http.client.HTTPSConnection):
+    """To the proxy, with the token unless the request has its own."""
+
+    token = None
+
+    def request(self, method, url, body=None, headers=None, **options):
+        headers = dict(headers or {})
+        if self.token and 'Authorization' not in headers:
+            headers['Authorization'] = f'Bearer {self.token}'
+        super().request(method, url, body, headers, **options)
 
 
 def side(**changes):
@@ -67,6 +94,8 @@ def command_line(state, *options, listen='127.0.0.1:0', worker=FAKE_WORKER):
         '--workers': '1',
         '--drain-timeout': '2',
     }
+    if PROXY:
+        options = ('--behind-proxy', '--proxy-addresses', '127.0.0.1', *options)
     return [PROGRAM, *(word for pair in usual.items() for word in pair), *options]
 
 
@@ -89,6 +118,19 @@ class Service:
             raise AssertionError('did not start: ' + self.errors())
         self.address = line.split('://')[1].strip()
         self.scheme = line.split('://')[0].split()[-1]
+        self.token = self.front = None
+        if PROXY:
+            self.go_behind_proxy()
+
+    def go_behind_proxy(self):
+        made = admin(self.state, 'token', 'create', 'scope=admin', 'name=of the tests')
+        self.front = front.Front(self.address)
+        self.address, self.scheme, self.token = self.front.address, 'https', made.strip()
+        eventually(lambda: self.get('/metrics').status != 401, 'the token to be known')
+
+    @property
+    def origin(self):
+        return f'{self.scheme}://{self.address}'
 
     def __enter__(self):
         return self
@@ -101,7 +143,25 @@ class Service:
             return file.read()
 
     def connect(self, timeout=PATIENCE_S):
-        return http.client.HTTPConnection(self.address, timeout=timeout)
+        if not self.front:
+            return http.client.HTTPConnection(self.address, timeout=timeout)
+        context = front.authority().context()
+        connection = SecureConnection(self.address, timeout=timeout, context=context)
+        connection.token = self.token
+        return connection
+
+    def open(self):
+        """A bare connection, for what is no good request."""
+        host, port = self.address.rsplit(':', 1)
+        plain = socket.create_connection((host, int(port)), timeout=PATIENCE_S)
+        if not self.front:
+            return plain
+        return front.authority().context().wrap_socket(plain, server_hostname=host)
+
+    def raw_request(self, text):
+        """Bytes of a request for open(), with the token where there is one."""
+        shown = f'Host: localhost\r\nAuthorization: Bearer {self.token}\r\n'.encode()
+        return text.replace(b'Host: localhost\r\n', shown) if self.token else text
 
     def ask(self, method, path, body=None, headers=None, timeout=PATIENCE_S):
         connection = self.connect(timeout)
@@ -145,6 +205,16 @@ class Service:
         self.process.wait()
         self.process.stdout.close()
         self.log.close()
+        self.stop_proxy()
+
+    def curl_options(self):
+        """The content of a .curlrc that knows the proxy's authority and the token."""
+        return (f'cacert = "{front.authority().certificate}"\n'
+                f'header = "Authorization: Bearer {self.token}"\n')
+
+    def stop_proxy(self):
+        if self.front:
+            self.front.stop()
 
     def signal(self, number):
         self.process.send_signal(number)
@@ -159,6 +229,7 @@ class Service:
             raise
         self.process.stdout.close()
         self.log.close()
+        self.stop_proxy()
         if status != 0:
             sys.stderr.write(self.errors())
         assert status == 0, f'ischiad ended with {status}'

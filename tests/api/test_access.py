@@ -12,7 +12,8 @@ import tempfile
 import time
 import unittest
 
-from service import JSON, PATIENCE_S, PROGRAM, Service, admin, eventually, side
+from service import (JSON, PATIENCE_S, PROGRAM, PROXY, Service, admin, direct_only, eventually,
+                     side)
 
 FORM = {'Content-Type': 'application/x-www-form-urlencoded'}
 
@@ -28,6 +29,7 @@ class Tokens(unittest.TestCase):
         cls.service.until_ready()
         state = cls.service.state
         cls.path = cls.service.submit(F=100.5)['links']['self']
+        cls.service.token = None  # each test shows its own, or none
         cls.tokens = {
             scope: admin(state, 'token', 'create', f'scope={scope}', f'name={scope}').strip()
             for scope in ('read', 'assess', 'read,assess', 'admin')
@@ -181,10 +183,12 @@ class Origins(unittest.TestCase):
             ('127.0.0.1@evil.example', 403),
         ):
             answer = self.service.get('/v1/parameters', Host=host)
-            self.assertEqual(answer.status, status, host)
+            # nginx refuses a name that can be none before the service sees it.
+            refused = PROXY and status == 403 and answer.status == 400
+            self.assertTrue(answer.status == status or refused, (host, answer.status))
 
     def test_a_foreign_page_may_not_change_anything(self):
-        own = 'http://' + self.service.address
+        own = self.service.origin
         cases = (
             ({'Origin': own}, 202),
             ({'Origin': 'https://portal.example'}, 202),
@@ -208,6 +212,7 @@ class Origins(unittest.TestCase):
 
 
 class Rates(unittest.TestCase):
+    @direct_only('says what a proxy says')
     def test_a_client_over_its_rate_is_429_and_others_are_not(self):
         with Service('--behind-proxy', '--rate-limit', '1', '--rate-burst', '10') as service:
             first = [
@@ -225,11 +230,13 @@ class Rates(unittest.TestCase):
                 'the client to be let in again',
             )
 
+    @direct_only('has no proxy')
     def test_a_forwarded_address_counts_only_behind_a_proxy(self):
         with Service('--rate-limit', '1', '--rate-burst', '1') as service:
             for _ in range(5):
                 self.assertEqual(service.get('/version', X_Forwarded_For='203.0.113.7').status, 200)
 
+    @direct_only('says what a proxy says')
     def test_sighup_changes_the_rate(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, 'ischiad.conf')
@@ -289,6 +296,7 @@ class Doors(unittest.TestCase):
         )
         return files
 
+    @direct_only('TLS of the service itself')
     def test_other_addresses_need_tokens_and_tls(self):
         self.assertIn('TLS is off', self.refuses('--listen', '0.0.0.0:0'))
         self.assertIn('TLS is off', self.refuses('--listen', '[::]:0'))
@@ -314,6 +322,7 @@ class Doors(unittest.TestCase):
                 self.assertIn(connection.sock.version(), ('TLSv1.3', 'TLSv1.2'))
                 connection.close()
 
+    @direct_only('where the service itself listens')
     def test_behind_a_proxy_any_address_will_do(self):
         with Service('--behind-proxy', listen='0.0.0.0:0') as service:
             port = service.address.rsplit(':', 1)[1]

@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 from emulator_file import write_emulator
-from service import HERE, PATIENCE_S, PROGRAM, Service, side
+from service import HERE, PATIENCE_S, PROGRAM, PROXY, Service, side
 
 ROOT = os.path.join(HERE, '../..')
 
@@ -65,13 +65,17 @@ class Docs(unittest.TestCase):
     def run_lines(self, service, folder):
         environment = {
             **os.environ,
-            'ISCHIA': 'http://' + service.address,
+            'ISCHIA': service.origin,
+            'CURL_HOME': folder,
             'ID': service.submit(F=250.5, subject='P-017', side='left')['id'],
             'RUNNING': service.submit(wait=0, F=599)['id'],
             'STUDY': self.study(service),
         }
         shutil.copy(os.path.join(ROOT, 'examples/table2.csv'), folder)
         shutil.copy(os.path.join(ROOT, 'examples/design_table1_composite.json'), folder)
+        if PROXY:  # as a user would: once, for all that follow
+            with open(os.path.join(folder, '.curlrc'), 'w', encoding='utf-8') as file:
+                file.write(service.curl_options())
         lines = sorted(curl_lines(), key=lambda line: ('/cancel' not in line, 'DELETE' in line))
         for line in lines:
             done = subprocess.run(

@@ -15,7 +15,7 @@ import tempfile
 import time
 import unittest
 
-from service import PATIENCE_S, PROGRAM, Service, admin, eventually
+from service import PATIENCE_S, PROGRAM, Service, admin, direct_only, eventually
 
 JOURNAL = '/run/systemd/journal'
 
@@ -186,6 +186,7 @@ def shown_by(service):
     return text.decode().strip().split('CN = ')[-1]
 
 
+@direct_only('TLS of the service itself')
 class Certificates(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
