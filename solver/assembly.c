@@ -5,15 +5,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void number_equations(struct assembly *a, const struct mesh *mesh)
+static bool rests_on_seat(const struct mesh *mesh, int n)
+{
+    return mesh->node_flags[n] & NODE_ON_SEAT && mesh->X_mm[n][2] <= 0;
+}
+
+static void number_nodes(struct assembly *a, const struct mesh *mesh, bool resting)
 {
     for (int n = 0; n < mesh->node_count; n++) {
         const unsigned flags = mesh->node_flags[n];
+        if (rests_on_seat(mesh, n) != resting) continue;
         const bool bone = flags & NODE_ON_BONE;
         a->equation[n][0] = bone || flags & NODE_ON_X0 ? EQUATION_FIXED : a->n++;
         a->equation[n][1] = bone || flags & NODE_ON_Y0 ? EQUATION_FIXED : a->n++;
         a->equation[n][2] = bone || flags & NODE_ON_PLATE ? EQUATION_BONE : a->n++;
     }
+}
+
+static void number_equations(struct assembly *a, const struct mesh *mesh)
+{
+    number_nodes(a, mesh, false);
+    a->seat_first = a->n;
+    number_nodes(a, mesh, true);
 }
 
 void assembly_element_equations(const struct assembly *a, const int hex[HEX_NODES],
@@ -136,7 +149,7 @@ static enum ischia_code reorder(struct assembly *a, const struct mesh *mesh,
     int *order = malloc(sizeof *order * (size_t)a->n), *rank = malloc(sizeof *rank * (size_t)a->n);
     enum ischia_code code;
     if (order != NULL && rank != NULL)
-        code = linear_order(a->n, pattern->start, pattern->row, order, err);
+        code = linear_order(a->n, a->n - a->seat_first, pattern->start, pattern->row, order, err);
     else
         code = FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the equations");
     for (int k = 0; code == ISCHIA_OK && k < a->n; k++) rank[order[k]] = k;
@@ -160,7 +173,7 @@ static enum ischia_code build(struct assembly *a, const struct mesh *mesh, struc
     pattern_finish(pattern);
     CHECK(pattern_init(pattern, a, mesh), err, ISCHIA_E_MEMORY, "%s", no_memory);
     map_entries(a, mesh, pattern);
-    return linear_create(&a->linear, a->n, pattern->start, pattern->row, err);
+    return linear_create(&a->linear, a->n, a->n - a->seat_first, pattern->start, pattern->row, err);
 }
 
 enum ischia_code assembly_init(struct assembly *ret, const struct mesh *mesh,

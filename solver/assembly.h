@@ -9,7 +9,9 @@
 
 /*
  * Numbering, sparsity pattern and scatter map of a mesh: made once for a topology. They depend on
- * node flags and connectivity only, so that they serve every case of one resolution.
+ * node flags, connectivity, and which nodes rest on the seat only, so that they serve every case of
+ * one resolution. The equations of the nodes that rest on the seat are the tail of the linear
+ * system: contact and friction are solved on what is condensed there (contact.h).
  *
  * Unknowns: the free displacement components, and the approach d of bone and seat, which moves all
  * bone nodes by u_z = -d. d is kept out of the matrix as a border: its column would be dense.
@@ -19,6 +21,7 @@ enum { EQUATION_FIXED = -1, EQUATION_BONE = -2 }; /* BONE: u_z = -d */
 
 struct assembly {
     int n;               /* equations, d not counted                                            */
+    int seat_first;      /* the first of those of the nodes that rest on the seat: the last ones */
     int (*equation)[3];  /* [node] equation of each component, or EQUATION_*                    */
     int (*scatter)[300]; /* [element] place in the values of each entry of the lower triangle
                              of the element matrix, row by row; -1: none                         */

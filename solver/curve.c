@@ -12,9 +12,6 @@ static const size_t quantities[] = {
 };
 enum { QUANTITY_COUNT = sizeof quantities / sizeof quantities[0] };
 
-/* A dense point this close to an end of the step it lies in, over the step, says nothing new. */
-static const double margin = 0.15;
-
 static double *quantity(struct ischia_load_point *p, int q)
 {
     return (double *)(void *)((char *)p + quantities[q]);
@@ -51,40 +48,4 @@ struct ischia_load_point load_curve_at(const struct load_curve *curve, double F_
             return mix(&before, after, (F_N - before.F_N) / (after->F_N - before.F_N));
     }
     return before;
-}
-
-static struct ischia_load_point difference(const struct ischia_load_point *a,
-                                           const struct load_curve *dense)
-{
-    const struct ischia_load_point there = load_curve_at(dense, a->F_N);
-    struct ischia_load_point ret = {.F_N = a->F_N};
-    for (int q = 0; q < QUANTITY_COUNT; q++) *quantity(&ret, q) = value(a, q) - value(&there, q);
-    return ret;
-}
-
-/* Adds the dense points between two points of the finer curve. */
-static void add_between(struct load_curve *ret, const struct load_curve *dense,
-                        const struct ischia_load_point *a, const struct ischia_load_point *b)
-{
-    const struct ischia_load_point at_a = difference(a, dense), at_b = difference(b, dense);
-    for (int i = 0; i < dense->count; i++) {
-        struct ischia_load_point p = dense->point[i];
-        const double t = (p.F_N - a->F_N) / (b->F_N - a->F_N);
-        if (!(t > margin && t < 1 - margin)) continue;
-        const struct ischia_load_point shift = mix(&at_a, &at_b, t);
-        for (int q = 0; q < QUANTITY_COUNT; q++) *quantity(&p, q) += value(&shift, q);
-        load_curve_add(ret, &p);
-    }
-}
-
-void load_curve_refine(struct load_curve *fine, const struct load_curve *dense)
-{
-    struct load_curve ret = {.count = 0};
-    struct ischia_load_point before = {0};
-    if (fine->count + dense->count > ISCHIA_LOAD_POINTS_MAX) return;
-    for (int i = 0; i < fine->count; before = fine->point[i++]) {
-        add_between(&ret, dense, &before, &fine->point[i]);
-        load_curve_add(&ret, &fine->point[i]);
-    }
-    *fine = ret;
 }

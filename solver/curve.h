@@ -17,10 +17,4 @@ void load_curve_add(struct load_curve *curve, const struct ischia_load_point *po
 /* At a force; the last point beyond it. */
 struct ischia_load_point load_curve_at(const struct load_curve *curve, double F_N);
 
-/*
- * Puts points of a denser curve, of a coarser mesh of the same case, between those of a finer one:
- * what the two curves differ by is taken to be linear between the points of the finer one.
- */
-void load_curve_refine(struct load_curve *fine, const struct load_curve *dense);
-
 #endif

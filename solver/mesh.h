@@ -36,11 +36,9 @@ struct mesh_divisions {
     int skin;   /* through the skin                                                 */
 };
 extern const struct mesh_divisions mesh_divisions[ISCHIA_RESOLUTION_COUNT];
-/* The coarser meshes that each resolution is solved on before: the same proportions, fewer
- * divisions; across = 0: none. The companion serves to extrapolate to ever finer meshes and to know
- * the error; each leads the next along the load path, and the starter is there for that alone. */
+/* The coarser mesh that each resolution is solved on as well, to extrapolate to ever finer meshes
+ * and to know the error: the same proportions, fewer divisions; across = 0: none. */
 extern const struct mesh_divisions mesh_companions[ISCHIA_RESOLUTION_COUNT];
-extern const struct mesh_divisions mesh_starters[ISCHIA_RESOLUTION_COUNT];
 
 struct mesh {
     int node_count;
@@ -67,12 +65,6 @@ struct mesh {
 ISCHIA_MUST_CHECK enum ischia_code mesh_local_init(struct mesh *ret, const struct ischia_case *c,
                                                    const struct mesh_divisions *divisions,
                                                    struct ischia_error *err);
-/*
- * Carries a nodal field from one local mesh to another of the same case but other divisions, by
- * trilinear interpolation in the blocks' own coordinates. from[node][3] -> ret_to[node][3].
- */
-void mesh_local_prolong(const struct mesh_divisions *from_divisions, const double (*from)[3],
-                        const struct mesh_divisions *to_divisions, double (*ret_to)[3]);
 
 /* Number of nodes of the local mesh with these divisions. */
 int mesh_local_node_count(const struct mesh_divisions *divisions);

@@ -16,7 +16,7 @@
  *       |_____|_x_|__x
  *
  * Spacings are functions of the fraction along a direction, so that the same fraction is the same
- * place in meshes of any divisions (prolongation relies on it).
+ * place in meshes of any divisions (extrapolation relies on it).
  */
 #include <assert.h>
 #include <math.h>
@@ -26,19 +26,14 @@
 #include "solver/mesh.h"
 
 const struct mesh_divisions mesh_divisions[ISCHIA_RESOLUTION_COUNT] = {
-    [ISCHIA_COARSE] = {.across = 4, .around = 2, .radial = 4, .fat = 2, .skin = 1},
-    [ISCHIA_STANDARD] = {.across = 8, .around = 4, .radial = 8, .fat = 4, .skin = 1},
-    [ISCHIA_FINE] = {.across = 12, .around = 6, .radial = 12, .fat = 6, .skin = 1},
+    [ISCHIA_COARSE] = {.across = 4, .around = 2, .radial = 6, .fat = 2, .skin = 1},
+    [ISCHIA_STANDARD] = {.across = 8, .around = 3, .radial = 12, .fat = 4, .skin = 1},
+    [ISCHIA_FINE] = {.across = 12, .around = 5, .radial = 18, .fat = 6, .skin = 1},
 };
 
 const struct mesh_divisions mesh_companions[ISCHIA_RESOLUTION_COUNT] = {
-    [ISCHIA_STANDARD] = {.across = 6, .around = 3, .radial = 6, .fat = 3, .skin = 1},
-    [ISCHIA_FINE] = {.across = 8, .around = 4, .radial = 8, .fat = 4, .skin = 1},
-};
-
-const struct mesh_divisions mesh_starters[ISCHIA_RESOLUTION_COUNT] = {
-    [ISCHIA_STANDARD] = {.across = 4, .around = 2, .radial = 4, .fat = 2, .skin = 1},
-    [ISCHIA_FINE] = {.across = 4, .around = 2, .radial = 4, .fat = 2, .skin = 1},
+    [ISCHIA_STANDARD] = {.across = 6, .around = 2, .radial = 9, .fat = 3, .skin = 1},
+    [ISCHIA_FINE] = {.across = 8, .around = 3, .radial = 12, .fat = 4, .skin = 1},
 };
 
 /* How far the core patch reaches over the quarter disc: along its axes, and at its corner. */
@@ -46,7 +41,7 @@ static const double core_axis_fraction = 0.55;
 static const double core_corner_fraction = 0.46;
 /* Slope of the spacing at the axis, 1 for even spacing: on the bowl and on the outer faces. */
 static const double bowl_axis_slope = 0.8;
-static const double outer_axis_slope = 0.35;
+static const double outer_axis_slope = 0.2;
 /* The same along the lines from the bone outward. */
 static const double radial_bone_slope = 0.4;
 /* Tissue beyond the bone's exit from the box top, at the least. */
@@ -463,67 +458,4 @@ enum ischia_code mesh_local_init(struct mesh *ret, const struct ischia_case *c,
     build_axis(&m);
     *ret = m;
     return ISCHIA_OK;
-}
-
-/* --- prolongation ----------------------------------------------------------------------------- */
-
-/* Where fraction i/n falls among `cells` cells: the cell, and the weight of its far end. */
-static int locate(int i, int n, int cells, double *ret_weight)
-{
-    const int cell = i * cells / n < cells ? i * cells / n : cells - 1;
-    *ret_weight = (double)i * cells / n - cell;
-    return cell;
-}
-
-static void blend8(const double (*from)[3], const int node[8], const double w[3], double ret[3])
-{
-    for (int k = 0; k < 3; k++) ret[k] = 0;
-    for (int c = 0; c < 8; c++) {
-        const double weight =
-            (c & 1 ? w[0] : 1 - w[0]) * (c & 2 ? w[1] : 1 - w[1]) * (c & 4 ? w[2] : 1 - w[2]);
-        for (int k = 0; k < 3; k++) ret[k] += weight * from[node[c]][k];
-    }
-}
-
-static void prolong_muscle(const struct mesh_divisions *f, const double (*from)[3],
-                           const struct mesh_divisions *t, double (*ret_to)[3], enum patch p)
-{
-    double w[3];
-    int node[8];
-    for (int l = 0; l <= t->radial; l++)
-        for (int j = 0; j <= patch_rows(t, p); j++)
-            for (int i = 0; i <= t->across; i++) {
-                const int fi = locate(i, t->across, f->across, &w[0]);
-                const int fj = locate(j, patch_rows(t, p), patch_rows(f, p), &w[1]);
-                const int fl = locate(l, t->radial, f->radial, &w[2]);
-                for (int c = 0; c < 8; c++)
-                    node[c] = muscle_node(f, p, fi + (c & 1), fj + (c >> 1 & 1), fl + (c >> 2));
-                blend8(from, node, w, ret_to[muscle_node(t, p, i, j, l)]);
-            }
-}
-
-static void prolong_layers(const struct mesh_divisions *f, const double (*from)[3],
-                           const struct mesh_divisions *t, double (*ret_to)[3], int first_f,
-                           int count_f, int first_t, int count_t)
-{
-    double w[3];
-    int node[8];
-    for (int k = 1; k <= count_t; k++)
-        for (int j = 0; j <= t->across; j++)
-            for (int i = 0; i <= t->across; i++) {
-                const int fi = locate(i, t->across, f->across, &w[0]);
-                const int fj = locate(j, t->across, f->across, &w[1]);
-                const int fk = first_f + locate(k, count_t, count_f, &w[2]);
-                for (int c = 0; c < 8; c++)
-                    node[c] = column_node(f, fi + (c & 1), fj + (c >> 1 & 1), fk + (c >> 2));
-                blend8(from, node, w, ret_to[column_node(t, i, j, first_t + k)]);
-            }
-}
-
-void mesh_local_prolong(const struct mesh_divisions *f, const double (*from)[3],
-                        const struct mesh_divisions *t, double (*ret_to)[3])
-{
-    for (int p = PATCH_CORE; p <= PATCH_Y; p++) prolong_muscle(f, from, t, ret_to, (enum patch)p);
-    prolong_layers(f, from, t, ret_to, 0, f->fat, 0, t->fat);
-    prolong_layers(f, from, t, ret_to, f->fat, f->skin, t->fat, t->skin);
 }

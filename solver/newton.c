@@ -1,19 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Two kinds of step.
+ * Each step factors the tangent with all equations but those of the nodes that rest on the seat
+ * eliminated; contact and friction are then solved on what is condensed there (contact.h), so that
+ * a step never goes through the seat. There are two kinds.
  *
  * The descent step holds the friction limits mu N at their lagged values. The load step is then a
- * minimisation, its tangent K is symmetric, and a line search on the potential makes the step safe
- * from anywhere: where K is not positive definite it is made so (element.h, convexity).
+ * minimisation, and a line search on the potential makes the step safe from anywhere: where the
+ * tangent is not positive definite it is made so (element.h, convexity).
  *
- * The exact step treats the contact forces as unknowns of their own: like the pressures of the
- * elements they are carried along by the linear model, for the gradient of a state that is not yet
- * in equilibrium says nothing about them. They decide which nodes press on the seat (a primal-dual
- * active set; Hintermueller, Ito and Kunisch 2003) and which slip, and their change enters the
- * tangent, mu t dN: the derivative of Coulomb's law, not symmetric, of low rank. GMRES solves with
- * it, preconditioned by the factor of K.
- *
- * d enters as a border: [K b; b' c] [du; dd] = -[g; g_d] by one more solve with K's factor.
+ * The exact step solves Coulomb's law for the linear model, and treats the contact forces as
+ * unknowns of their own: like the pressures of the elements they are carried along by the model,
+ * for the gradient of a state that is not yet in equilibrium says nothing about them.
  */
 #include "solver/newton.h"
 
@@ -21,7 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "solver/gmres.h"
+#include "solver/contact.h"
 
 /* Armijo's constant; the shortest and the longest step tried, over a Newton step; potential changes
  * below this share of the elastic energy are rounding and say nothing about descent. */
@@ -38,15 +35,9 @@ static const int exact_damp_after = 2;
 static const double exact_damping = 0.6;
 static const int exact_idle_max = 6;
 static const int exact_rest = 2; /* more after each relapse */
-static const double gmres_tolerance = 1e-4;
 /* A direction that moves a node further than this, over the tissue's height, comes from a tangent
  * that is nearly singular: descend instead. */
 static const double exact_move_max = 0.1;
-/* How often a direction is found anew because it changes which nodes press on the seat. */
-enum { CONTACT_ROUNDS_MAX = 4 };
-/* What GMRES must reach with a factor of other nodes on the seat; else these are factored. */
-static const double stale_factor_max = 1e-2;
-
 /* Convexities tried in turn until the tangent is positive definite. */
 static const double convexity_ladder[] = {0, 0.3, 1};
 
@@ -54,28 +45,22 @@ struct newton {
     struct body *body;
     struct assembly *assembly;
     struct seat *seat;
+    struct contact *contact;
     int n;
     double (*force)[3];  /* [node] gradient of the potential                                  */
+    double (*bulk)[3];   /* [node] of it the body's, without friction                         */
     double (*trial)[3];  /* [node]                                                            */
     double (*saved)[3];  /* [node] displacements before an exact step                         */
-    double *normal_N;    /* [node] scratch: contact forces by the gradient, or by the model */
-    double *saved_N;     /* [node] tracked contact forces before an exact step              */
+    double *normal_N;    /* [node] contact forces by the gradient, or by the model            */
+    double *saved_N;     /* [node] tracked contact forces before an exact step                */
     double *border;      /* [n] d2E / du dd                                                   */
-    double *landing;     /* [n] z step that ends on the seat, of nodes about to touch it      */
-    double *from_border; /* [n] K^-1 of the masked border, of the present factor              */
+    double *reduced;     /* [2][n] the load, and minus the border, as linear_reduce leaves them */
     double *direction;   /* [n + 1] du, dd                                                    */
-    double *scratch;     /* [n + 1]                                                           */
-    double *krylov;
-    unsigned char *keep;     /* [n] 0: on the seat, out of the system                             */
-    unsigned char *factored; /* [n] keep, when it was factored                           */
-    double *good;            /* [n + 1] the last direction within bounds                          */
-    double *good_N;          /* [node] its contact forces                                         */
-    double corner;           /* d2E / dd2                                                         */
-    double schur;            /* corner - border . from_border                                     */
+    unsigned char *keep; /* [n] 0: a node off the outer skin that touches the seat; held    */
+    double corner;       /* d2E / dd2                                                         */
     double elastic_Nmm;
     double reaction_N; /* of the bone                                                       */
     double residual;   /* with the contact forces of the present iterate                    */
-    double lagged_residual;
     bool force_controlled;
     bool convexified; /* the factored tangent is not the exact one */
 };
@@ -88,48 +73,42 @@ enum ischia_code newton_create(struct newton **ret, struct body *body, struct as
     CHECK(w != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the Newton iteration");
     *w = (struct newton){.body = body, .assembly = assembly, .seat = seat, .n = assembly->n};
     w->force = calloc(nodes, sizeof *w->force);
+    w->bulk = calloc(nodes, sizeof *w->bulk);
     w->trial = calloc(nodes, sizeof *w->trial);
     w->saved = calloc(nodes, sizeof *w->saved);
     w->normal_N = calloc(nodes, sizeof *w->normal_N);
     w->saved_N = calloc(nodes, sizeof *w->saved_N);
     w->border = calloc(n, sizeof *w->border);
-    w->landing = calloc(n, sizeof *w->landing);
-    w->from_border = calloc(n, sizeof *w->from_border);
+    w->reduced = calloc(2 * n, sizeof *w->reduced);
     w->direction = calloc(n + 1, sizeof *w->direction);
-    w->scratch = calloc(n + 1, sizeof *w->scratch);
-    w->krylov = malloc(gmres_work_size(assembly->n + 1) * sizeof *w->krylov);
     w->keep = calloc(n, sizeof *w->keep);
-    w->factored = calloc(n, sizeof *w->factored);
-    w->good = calloc(n + 1, sizeof *w->good);
-    w->good_N = calloc(nodes, sizeof *w->good_N);
-    if (!w->force || !w->trial || !w->saved || !w->normal_N || !w->saved_N || !w->border ||
-        !w->landing || !w->from_border || !w->direction || !w->scratch || !w->krylov || !w->keep ||
-        !w->factored || !w->good || !w->good_N) {
+    if (!w->force || !w->bulk || !w->trial || !w->saved || !w->normal_N || !w->saved_N ||
+        !w->border || !w->reduced || !w->direction || !w->keep) {
         newton_destroy(w);
         return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the Newton iteration");
     }
-    *ret = w;
-    return ISCHIA_OK;
+    const enum ischia_code code = contact_create(&w->contact, body->mesh, assembly, err);
+    if (code == ISCHIA_OK)
+        *ret = w;
+    else
+        newton_destroy(w);
+    return code;
 }
 
 void newton_destroy(struct newton *w)
 {
     if (w == NULL) return;
+    contact_destroy(w->contact);
     free(w->force);
+    free(w->bulk);
     free(w->trial);
     free(w->saved);
     free(w->normal_N);
     free(w->saved_N);
     free(w->border);
-    free(w->landing);
-    free(w->from_border);
+    free(w->reduced);
     free(w->direction);
-    free(w->scratch);
-    free(w->krylov);
     free(w->keep);
-    free(w->factored);
-    free(w->good);
-    free(w->good_N);
     free(w);
 }
 
@@ -171,13 +150,20 @@ static void find_gradient_normals(struct newton *w, const double (*u)[3])
             seat_binds(w->body->mesh, u, (const double(*)[3])w->force, n) ? w->force[n][2] : 0;
 }
 
-/* Nodes with a contact force leave the system. */
-static void keep_without(struct newton *w, const double *normal_N)
+/* The equations of the nodes that rest on the seat come last, and are the contact's. */
+static bool is_condensed(const struct newton *w, int equation)
+{
+    return equation >= w->assembly->seat_first;
+}
+
+/* Other nodes that press on the seat are held there by the linear system. */
+static void hold_other_nodes(struct newton *w)
 {
     memset(w->keep, 1, (size_t)w->n);
-    memset(w->landing, 0, sizeof *w->landing * (size_t)w->n);
-    for (int n = 0; n < w->body->mesh->node_count; n++)
-        if (normal_N[n] > 0) w->keep[w->assembly->equation[n][2]] = 0;
+    for (int n = 0; n < w->body->mesh->node_count; n++) {
+        const int eq = w->assembly->equation[n][2];
+        if (w->normal_N[n] > 0 && !is_condensed(w, eq)) w->keep[eq] = 0;
+    }
 }
 
 /* Energy, elastic gradient and Hessian at u, and friction for the tracked contact forces. */
@@ -189,6 +175,8 @@ static void linearise(struct newton *w, const double (*u)[3], double convexity,
     w->corner = d.corner;
     w->reaction_N = bone_reaction_N(w);
     find_gradient_normals(w, u);
+    hold_other_nodes(w);
+    memcpy(w->bulk, w->force, sizeof *w->bulk * (size_t)w->body->mesh->node_count);
     seat_add_force(w->seat, w->seat->normal_N, u, w->force);
     seat_add_stiffness(w->seat, w->assembly, u);
     w->residual = residual_norm(w, control);
@@ -203,58 +191,53 @@ static double dot(int n, const double *a, const double *b)
     return sum;
 }
 
-/* x = K^-1 x, bordered under force control; x[n] belongs to d. */
-static enum ischia_code bordered_solve(struct newton *w, double *x, struct ischia_error *err)
+/* The right-hand sides, of all that is not contact: minus the gradient, and minus the border. */
+static void load_right_hand_sides(struct newton *w)
 {
-    TRY(linear_solve(w->assembly->linear, 1, x, err));
-    if (!w->force_controlled) {
-        x[w->n] = 0;
-        return ISCHIA_OK;
-    }
-    x[w->n] = (x[w->n] - dot(w->n, w->border, x)) / w->schur;
-    for (int i = 0; i < w->n; i++) x[i] -= x[w->n] * w->from_border[i];
-    return ISCHIA_OK;
-}
-
-/* The same with a factor that may be of an earlier set of nodes on the seat: equations that joined
- * since are scaled by their diagonal, those that left are zero. */
-static enum ischia_code precondition(void *context, double *x, struct ischia_error *err)
-{
-    struct newton *w = context;
-    for (int i = 0; i < w->n; i++)
-        if (w->keep[i] && !w->factored[i]) x[i] /= linear_diagonal(w->assembly->linear, i);
-    TRY(bordered_solve(w, x, err));
-    for (int i = 0; i < w->n; i++)
-        if (!w->keep[i]) x[i] = 0;
-    return ISCHIA_OK;
-}
-
-/* y = the exact tangent times x: K's rows, and mu t dN for the slipping nodes. */
-static void apply_exact(void *context, const double *x, double *ret_y)
-{
-    struct newton *w = context;
-    const double dd = w->force_controlled ? x[w->n] : 0;
-    linear_multiply(w->assembly->linear, x, ret_y);
-    for (int i = 0; i < w->n; i++) ret_y[i] += dd * w->border[i];
-    seat_add_normal_change(w->seat, w->assembly, (const double(*)[3])w->trial, ret_y);
-    for (int i = 0; i < w->n; i++)
-        if (!w->keep[i]) ret_y[i] = 0;
-    ret_y[w->n] = w->force_controlled ? dot(w->n, w->border, x) + w->corner * dd : 0;
-}
-
-/* ret[n + 1] = right-hand side of the step: minus the gradient, less what landing nodes bring. */
-static void load_right_hand_side(struct newton *w, const struct newton_control *control,
-                                 double *ret)
-{
-    linear_multiply(w->assembly->linear, w->landing, w->scratch);
+    double *load = w->reduced, *border = w->reduced + w->n;
     for (int n = 0; n < w->body->mesh->node_count; n++)
         for (int c = 0; c < 3; c++) {
             const int eq = w->assembly->equation[n][c];
-            if (eq >= 0) ret[eq] = w->keep[eq] ? -w->force[n][c] - w->scratch[eq] : 0;
+            if (eq < 0) continue;
+            load[eq] = is_condensed(w, eq) ? -w->bulk[n][c] : -w->force[n][c];
+            border[eq] = -w->border[eq];
+            if (!w->keep[eq]) load[eq] = border[eq] = 0;
         }
-    ret[w->n] = control->force_controlled
-                    ? control->force_N - w->reaction_N - dot(w->n, w->border, w->landing)
-                    : 0;
+}
+
+/* Factors the tangent and condenses the model to the nodes on the seat; *ret_factored tells
+ * whether what is eliminated is positive definite. */
+static enum ischia_code condense(struct newton *w, const struct newton_control *control,
+                                 struct newton_report *report, bool *ret_factored,
+                                 struct ischia_error *err)
+{
+    struct contact_model *model = contact_model_of(w->contact);
+    const int first = w->assembly->seat_first, rows = w->n - first;
+    enum linear_outcome outcome;
+    TRY(linear_factor(w->assembly->linear, w->keep, &outcome, err));
+    report->factorisations++;
+    *ret_factored = outcome == LINEAR_FACTORED;
+    if (!*ret_factored) return ISCHIA_OK;
+    load_right_hand_sides(w);
+    TRY(linear_reduce(w->assembly->linear, 2, w->reduced, err));
+    const double *load = w->reduced, *border = w->reduced + w->n;
+    linear_condensed(w->assembly->linear, model->stiffness);
+    memcpy(model->load, load + first, sizeof *model->load * (size_t)rows);
+    for (int i = 0; i < rows; i++) model->border[i] = -border[first + i];
+    model->corner = w->corner - dot(first, border, border);
+    model->d_load = control->force_N - w->reaction_N + dot(first, border, load);
+    model->force_controlled = w->force_controlled;
+    return ISCHIA_OK;
+}
+
+/* The direction from its part at the seat, w->direction[first ... n], which contact gave. */
+static enum ischia_code expand(struct newton *w, double load_share, double dd,
+                               struct ischia_error *err)
+{
+    for (int i = 0; i < w->assembly->seat_first; i++)
+        w->direction[i] = load_share * w->reduced[i] + dd * w->reduced[w->n + i];
+    w->direction[w->n] = dd;
+    return linear_expand(w->assembly->linear, w->direction, err);
 }
 
 static double largest_move_mm(const struct newton *w)
@@ -264,93 +247,37 @@ static double largest_move_mm(const struct newton *w)
     return largest;
 }
 
-/* The same for the exact step: slipping nodes feel the gradient's contact force, which the tangent
- * completes to the model's, instead of the tracked one. */
-static void load_exact_right_hand_side(struct newton *w, const struct newton_control *control,
-                                       double *ret)
+/* The direction of the present model, into w->direction and w->normal_N. *ret_found: what is
+ * eliminated is definite, contact has a solution, and the model is stable with it. */
+static enum ischia_code solve_model(struct newton *w, const struct equilibrium *state,
+                                    const struct newton_control *control,
+                                    enum contact_friction friction, struct newton_report *report,
+                                    bool *ret_found, struct ischia_error *err)
 {
-    load_right_hand_side(w, control, ret);
-    for (int n = 0; n < w->body->mesh->node_count; n++) {
-        const int *eq = w->assembly->equation[n];
-        double slip[2];
-        if (eq[2] < 0 || !seat_slip_direction(w->seat, (const double(*)[3])w->trial, n, slip))
-            continue;
-        const double change =
-            w->seat->friction * (w->force[n][2] + w->scratch[eq[2]] - w->seat->normal_N[n]);
-        for (int c = 0; c < 2; c++)
-            if (eq[c] >= 0) ret[eq[c]] -= change * slip[c];
-    }
+    const double(*u)[3] = (const double(*)[3])state->u_mm;
+    double dd;
+    TRY(condense(w, control, report, ret_found, err));
+    if (!*ret_found) return ISCHIA_OK;
+    *ret_found = contact_solve(w->contact, w->seat, u, friction,
+                               w->direction + w->assembly->seat_first, &dd, w->normal_N) &&
+                 contact_is_stable(w->contact, w->seat);
+    return *ret_found ? expand(w, 1, dd, err) : ISCHIA_OK;
 }
 
-static void add_landing(struct newton *w)
-{
-    for (int i = 0; i < w->n; i++) w->direction[i] += w->landing[i];
-}
-
-/* Contact forces that the linear model gives after the direction: gradient + K du + border dd. */
-static void find_model_normals(struct newton *w)
-{
-    const double dd = w->force_controlled ? w->direction[w->n] : 0;
-    linear_multiply(w->assembly->linear, w->direction, w->scratch);
-    for (int n = 0; n < w->body->mesh->node_count; n++) {
-        const int eq = w->assembly->equation[n][2];
-        w->normal_N[n] = 0;
-        if (eq >= 0 && !w->keep[eq])
-            w->normal_N[n] = w->force[n][2] + w->scratch[eq] + dd * w->border[eq];
-    }
-}
-
-/* Lets go of nodes that the seat would have to pull, and lands those that the direction would push
- * through it. Returns how many changed. */
-static int change_contact(struct newton *w, const struct equilibrium *state)
-{
-    const struct mesh *mesh = w->body->mesh;
-    int count = 0;
-    for (int n = 0; n < mesh->node_count; n++) {
-        const int eq = w->assembly->equation[n][2];
-        if (!(mesh->node_flags[n] & NODE_ON_SEAT) || eq < 0) continue;
-        const double gap = seat_gap_mm(mesh, (const double(*)[3])state->u_mm, n);
-        const bool lets_go = !w->keep[eq] && w->normal_N[n] < 0;
-        const bool lands = w->keep[eq] && gap + w->direction[eq] < 0;
-        if (!lets_go && !lands) continue;
-        w->keep[eq] = lets_go;
-        w->landing[eq] = lands ? -gap : 0;
-        count++;
-    }
-    return count;
-}
-
-/* Factors the tangent and solves for the border; *ret_definite tells whether both gave descent. */
-static enum ischia_code factor(struct newton *w, struct newton_report *report, bool *ret_definite,
-                               struct ischia_error *err)
-{
-    enum linear_outcome outcome;
-    TRY(linear_factor(w->assembly->linear, w->keep, &outcome, err));
-    report->factorisations++;
-    memcpy(w->factored, w->keep, (size_t)w->n);
-    *ret_definite = outcome == LINEAR_FACTORED;
-    if (!*ret_definite) return ISCHIA_OK;
-    for (int i = 0; i < w->n; i++) w->from_border[i] = w->keep[i] ? w->border[i] : 0;
-    TRY(linear_solve(w->assembly->linear, 1, w->from_border, err));
-    w->schur = w->corner - dot(w->n, w->border, w->from_border);
-    if (w->force_controlled) *ret_definite = w->schur > 0;
-    return ISCHIA_OK;
-}
-
-/* Factors at the given rung of the convexity ladder, and raises it until the tangent is positive
- * definite. */
-static enum ischia_code factor_definite(struct newton *w, const struct equilibrium *state,
-                                        const struct newton_control *control, size_t *rung,
-                                        struct newton_report *report, bool *ret_definite,
-                                        struct ischia_error *err)
+/* The same; raises the convexity of the tangent until there is a direction. */
+static enum ischia_code find_direction(struct newton *w, const struct equilibrium *state,
+                                       const struct newton_control *control,
+                                       enum contact_friction friction, struct newton_report *report,
+                                       bool *ret_found, struct ischia_error *err)
 {
     const size_t rungs = sizeof convexity_ladder / sizeof convexity_ladder[0];
-    TRY(factor(w, report, ret_definite, err));
-    while (!*ret_definite && *rung + 1 < rungs) {
-        linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[++*rung], control);
-        TRY(factor(w, report, ret_definite, err));
+    size_t rung = 0;
+    TRY(solve_model(w, state, control, friction, report, ret_found, err));
+    while (!*ret_found && ++rung < rungs) {
+        linearise(w, (const double(*)[3])state->u_mm, convexity_ladder[rung], control);
+        TRY(solve_model(w, state, control, friction, report, ret_found, err));
     }
-    w->convexified = *rung > 0;
+    w->convexified = rung > 0;
     return ISCHIA_OK;
 }
 
@@ -371,8 +298,7 @@ static double move(struct newton *w, const struct equilibrium *state, double alp
             if (eq >= 0) w->trial[n][c] += alpha * w->direction[eq];
             if (eq == EQUATION_BONE) w->trial[n][c] = -(state->d_mm + alpha * dd);
         }
-        if (mesh->node_flags[n] & NODE_ON_SEAT)
-            w->trial[n][2] = fmax(w->trial[n][2], -mesh->X_mm[n][2]);
+        if (mesh->node_flags[n] & NODE_ON_SEAT) seat_stop(mesh, n, w->trial[n]);
         for (int c = 0; c < 3; c++)
             if (w->assembly->equation[n][c] >= 0)
                 slope += w->force[n][c] * (w->trial[n][c] - state->u_mm[n][c]);
@@ -459,116 +385,41 @@ static bool move_uninverted(struct newton *w, struct equilibrium *state, double 
 static void relag(struct newton *w, const struct equilibrium *state,
                   const struct newton_control *control)
 {
-    const double(*u)[3] = (const double(*)[3])state->u_mm;
     double sum = 0;
     for (int n = 0; n < w->body->mesh->node_count; n++)
-        for (int c = 0; c < 3; c++) {
-            const int eq = w->assembly->equation[n][c];
-            if (eq >= 0 && w->keep[eq]) sum += pow(w->force[n][c], 2);
-        }
+        for (int c = 0; c < 3; c++)
+            if (w->assembly->equation[n][c] >= 0 && !(c == 2 && w->normal_N[n] > 0))
+                sum += pow(w->force[n][c], 2);
     if (sqrt(sum) / control->force_N >= relag_share * w->residual) return;
     memcpy(w->seat->normal_N, w->normal_N, node_bytes(w));
-    linearise(w, u, 0, control);
-    keep_without(w, w->normal_N);
+    linearise(w, (const double(*)[3])state->u_mm, 0, control);
 }
 
 static enum ischia_code descent_step(struct newton *w, struct equilibrium *state,
                                      const struct newton_control *control,
                                      struct newton_report *report, struct ischia_error *err)
 {
-    bool definite;
-    size_t rung = 0;
-    keep_without(w, w->normal_N);
+    bool found;
     relag(w, state, control);
-    TRY(factor_definite(w, state, control, &rung, report, &definite, err));
-    if (definite) {
-        load_right_hand_side(w, control, w->direction);
-        TRY(bordered_solve(w, w->direction, err));
-    }
-    if (!definite)
+    TRY(find_direction(w, state, control, CONTACT_LAGGED, report, &found, err));
+    if (!found)
         report->reason = ISCHIA_DIVERGED_LINEAR;
     else if (!line_search(w, state, control))
         report->reason = ISCHIA_DIVERGED_STEP;
     return ISCHIA_OK;
 }
 
-/* A direction of the exact step being found: for the nodes that w->keep leaves on the seat. */
-struct direction {
-    size_t rung;    /* of the convexity ladder                                          */
-    double reached; /* GMRES' residual over the right-hand side                         */
-    bool found;     /* definite, solved, and within bounds                              */
-    bool fresh;     /* by a factor of the very nodes on the seat, not of an earlier set */
-};
-
 /* A tangent that had to be made convex still leads: carried along by it, the pressures and contact
  * forces come right within a few steps, and with them the tangent. */
-static enum ischia_code find_direction(struct newton *w, const struct equilibrium *state,
-                                       const struct newton_control *control,
-                                       struct newton_report *report, struct direction *d,
-                                       struct ischia_error *err)
-{
-    const struct gmres_operator op = {apply_exact, precondition, w};
-    d->found = true;
-    if (d->fresh) TRY(factor_definite(w, state, control, &d->rung, report, &d->found, err));
-    if (!d->found) return ISCHIA_OK;
-    load_exact_right_hand_side(w, control, w->direction);
-    TRY(gmres(&op, w->n + 1, gmres_tolerance, w->direction, w->krylov, &d->reached, err));
-    add_landing(w);
-    d->found = d->reached < (d->fresh ? exact_reduction : stale_factor_max) &&
-               largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm;
-    return ISCHIA_OK;
-}
-
-static void keep_good(struct newton *w)
-{
-    memcpy(w->good, w->direction, sizeof *w->good * (size_t)(w->n + 1));
-    memcpy(w->good_N, w->normal_N, node_bytes(w));
-}
-
-static void take_good(struct newton *w)
-{
-    memcpy(w->direction, w->good, sizeof *w->good * (size_t)(w->n + 1));
-    memcpy(w->normal_N, w->good_N, node_bytes(w));
-}
-
-/*
- * Finds the direction, and finds it anew while it changes which nodes press on the seat: at first
- * with the factor of the nodes before, which GMRES makes good; with a new factor where that fails.
- * The last direction within bounds is taken; *ret_found is false when there is none.
- */
-static enum ischia_code exact_direction(struct newton *w, const struct equilibrium *state,
-                                        const struct newton_control *control,
-                                        struct newton_report *report, bool *ret_found,
-                                        struct ischia_error *err)
-{
-    struct direction d = {.fresh = true};
-    *ret_found = false;
-    keep_without(w, w->seat->normal_N);
-    memcpy(w->trial, state->u_mm, 3 * node_bytes(w));
-    for (int round = 0; round < CONTACT_ROUNDS_MAX; round++) {
-        TRY(find_direction(w, state, control, report, &d, err));
-        if (!d.found && d.fresh) break;
-        if (d.found) {
-            find_model_normals(w);
-            keep_good(w);
-            *ret_found = true;
-            if (change_contact(w, state) == 0) break;
-        }
-        d.fresh = !d.found;
-    }
-    if (*ret_found) take_good(w);
-    return ISCHIA_OK;
-}
-
 static enum ischia_code exact_step(struct newton *w, struct equilibrium *state, double alpha_max,
                                    const struct newton_control *control,
                                    struct newton_report *report, bool *ret_made,
                                    struct ischia_error *err)
 {
     double alpha = 0;
-    TRY(exact_direction(w, state, control, report, ret_made, err));
-    if (!*ret_made) return ISCHIA_OK;
-    *ret_made = move_uninverted(w, state, alpha_max, control, &alpha);
+    TRY(find_direction(w, state, control, CONTACT_COULOMB, report, ret_made, err));
+    *ret_made = *ret_made && largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm &&
+                move_uninverted(w, state, alpha_max, control, &alpha);
     for (int n = 0; *ret_made && n < w->body->mesh->node_count; n++) {
         double *tracked = &w->seat->normal_N[n];
         *tracked = fmax(0, *tracked + alpha * (w->normal_N[n] - *tracked));
@@ -657,13 +508,11 @@ enum ischia_code newton_minimise(struct newton *w, struct equilibrium *state,
             return FAIL(err, ISCHIA_E_CANCELLED, "cancelled");
         if (w->residual <= control->tolerance)
             report.reason = ISCHIA_CONVERGED;
-        else if (report.iterations++ >= control->iterations_max ||
-                 (control->relapses_max > 0 && run.relapses > control->relapses_max))
+        else if (report.iterations++ >= control->iterations_max)
             report.reason = ISCHIA_DIVERGED_ITERATIONS;
         else
             TRY(one_step(w, state, control, &run, &report, err));
     }
-    keep_without(w, w->seat->normal_N);
     *ret_report = report;
     return ISCHIA_OK;
 }
@@ -672,29 +521,45 @@ void newton_linearise(struct newton *w, const struct equilibrium *state)
 {
     const struct newton_control any_scale = {.force_N = 1};
     const double(*u)[3] = (const double(*)[3])state->u_mm;
-    w->force_controlled = false;
     body_reset_pressure(w->body, u);
     linearise(w, u, 0, &any_scale);
-    keep_without(w, w->seat->normal_N);
 }
 
-enum ischia_code newton_tangent(struct newton *w, struct newton_tangent *ret,
-                                struct ischia_error *err)
+/* The rate of the condensed model with d: its load is what the border brings. */
+static enum ischia_code condense_rate(struct newton *w, bool *ret_factored,
+                                      struct ischia_error *err)
 {
-    bool definite;
+    const struct newton_control any = {.force_N = 1};
     struct newton_report report = {0};
-    TRY(factor(w, &report, &definite, err));
-    ret->stiffness_N_mm = definite ? w->schur : 0;
-    for (int i = 0; i < w->n; i++) w->direction[i] = w->keep[i] ? -w->from_border[i] : 0;
-    linear_multiply(w->assembly->linear, w->direction, w->scratch);
+    struct contact_model *model = contact_model_of(w->contact);
+    w->force_controlled = false;
+    TRY(condense(w, &any, &report, ret_factored, err));
+    for (int i = 0; *ret_factored && i < w->n - w->assembly->seat_first; i++)
+        model->load[i] = -model->border[i];
+    return ISCHIA_OK;
+}
+
+enum ischia_code newton_tangent(struct newton *w, const struct equilibrium *state,
+                                struct newton_tangent *ret, struct ischia_error *err)
+{
+    struct contact_model *model = contact_model_of(w->contact);
+    const int first = w->assembly->seat_first;
+    bool found;
+    TRY(condense_rate(w, &found, err));
+    found = found &&
+            contact_rate(w->contact, w->seat, (const double(*)[3])state->u_mm, w->direction + first,
+                         ret->normal_rate_N_mm) &&
+            contact_is_stable(w->contact, w->seat);
+    ret->stiffness_N_mm =
+        found ? model->corner + dot(w->n - first, model->border, w->direction + first) : 0;
+    if (!found) return ISCHIA_OK;
+    TRY(expand(w, 0, 1, err));
     for (int n = 0; n < w->body->mesh->node_count; n++) {
         const int *eq = w->assembly->equation[n];
         for (int c = 0; c < 3; c++)
             ret->direction[n][c] = eq[c] >= 0               ? w->direction[eq[c]]
                                    : eq[c] == EQUATION_BONE ? -1
                                                             : 0;
-        ret->normal_rate_N_mm[n] =
-            eq[2] >= 0 && !w->keep[eq[2]] ? w->scratch[eq[2]] + w->border[eq[2]] : 0;
     }
     return ISCHIA_OK;
 }

@@ -12,9 +12,8 @@
  *
  *     elastic energy(u, d) + friction potential(u; N) - force * d     subject to gap(u) >= 0,
  *
- * by projected Newton steps (Bertsekas 1982): nodes that the gradient presses on the seat leave the
- * system, the others move along the Newton direction and are stopped at the seat. A line search
- * keeps det F > 0 and the potential falling. N is the contact force of the present iterate.
+ * by Newton steps that solve the linear model's contact and friction exactly (contact.h). N is the
+ * contact force of the present iterate.
  */
 
 struct equilibrium { /* the state of a body on its seat */
@@ -29,7 +28,6 @@ struct newton_control {
     double force_N;   /* quarter model's: the target, and the scale of the residual */
     double tolerance; /* |residual| / force_N                                       */
     int iterations_max;
-    int relapses_max; /* runs of exact steps that may be undone before giving up; 0: any number */
 };
 
 struct newton_report {
@@ -59,14 +57,15 @@ newton_minimise(struct newton *newton, struct equilibrium *state,
 /* Prepares for newton_tangent at a state that was not just minimised: at rest, or gone back to. */
 void newton_linearise(struct newton *newton, const struct equilibrium *state);
 
-struct newton_tangent {       /* of the equilibrium with respect to d, friction limits held */
-    double stiffness_N_mm;    /* dF/dd; 0 when the tangent is not positive definite          */
+struct newton_tangent {       /* of the equilibrium with respect to d                        */
+    double stiffness_N_mm;    /* dF/dd; 0 where the equilibrium is not stable: no direction  */
     double (*direction)[3];   /* [node] du/dd; the caller's array                            */
     double *normal_rate_N_mm; /* [node] change of the contact forces; the caller's array     */
 };
 
 /* Factors the tangent of the state that the last minimisation or linearisation left. */
-ISCHIA_MUST_CHECK enum ischia_code newton_tangent(struct newton *newton, struct newton_tangent *ret,
-                                                  struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code
+newton_tangent(struct newton *newton, const struct equilibrium *state, struct newton_tangent *ret,
+               struct ischia_error *err);
 
 #endif

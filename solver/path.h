@@ -2,20 +2,12 @@
 #ifndef ISCHIA_SOLVER_PATH_H
 #define ISCHIA_SOLVER_PATH_H
 
-#include "solver/guide.h"
 #include "solver/newton.h"
 
 /*
  * The load path: the bone goes down in steps until the seat carries the whole force; the last step
  * is taken under force control, so that the force is met exactly.
  */
-
-struct path_point {
-    double d_mm;
-    double force_N;        /* quarter model */
-    double stiffness_N_mm; /* dF/dd         */
-    double work_Nmm;       /* of the seat   */
-};
 
 struct path_report {
     enum ischia_reason reason;
@@ -32,7 +24,7 @@ struct path_report {
 struct path_observer {
     bool (*on_iteration)(void *context, int load_step, int newton_iteration, double force_N);
     enum ischia_code (*on_step)(void *context, const struct equilibrium *state,
-                                const struct path_point *point, struct ischia_error *err);
+                                struct ischia_error *err);
     void *context;
 };
 
@@ -40,7 +32,7 @@ struct path_observer {
  * in the last converged state. */
 ISCHIA_MUST_CHECK enum ischia_code
 path_follow(struct body *body, struct assembly *assembly, struct seat *seat, double force_N,
-            const struct guide *guide, const struct path_observer *observer,
-            struct equilibrium *state, struct path_report *ret_report, struct ischia_error *err);
+            const struct path_observer *observer, struct equilibrium *state,
+            struct path_report *ret_report, struct ischia_error *err);
 
 #endif

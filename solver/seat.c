@@ -8,6 +8,9 @@
 /* Stiffness of the sticking springs by unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
 static const double stick_stiffness_MPa_mm = 0.25;
 
+/* A node this near the seat lies on it: it was put there by a sum that rounded. */
+static const double touch_mm = 1e-12;
+
 /* The outer skin starts resting on the seat: pressed by a force too small to matter, not zero. */
 static const double resting_N = 1e-12;
 
@@ -59,6 +62,11 @@ void seat_finish(struct seat *seat)
     *seat = (struct seat){0};
 }
 
+void seat_stop(const struct mesh *mesh, int n, double u[3])
+{
+    if (mesh->X_mm[n][2] + u[2] < touch_mm) u[2] = -mesh->X_mm[n][2];
+}
+
 bool seat_binds(const struct mesh *mesh, const double (*u)[3], const double (*force)[3], int n)
 {
     return mesh->node_flags[n] & NODE_ON_SEAT && seat_gap_mm(mesh, u, n) <= 0 && force[n][2] > 0;
@@ -103,19 +111,22 @@ void seat_add_force(const struct seat *seat, const double *normal_N, const doubl
     }
 }
 
+void seat_spring_hessian(double stick_N_mm, double limit_N, bool slips, const double stretch_mm[2],
+                         double ret[2][2])
+{
+    const double r = hypot(stretch_mm[0], stretch_mm[1]);
+    const double stick = slips ? 0 : stick_N_mm, across = slips && r > 0 ? limit_N / r : 0;
+    const double tx = r > 0 ? stretch_mm[0] / r : 0, ty = r > 0 ? stretch_mm[1] / r : 0;
+    ret[0][0] = stick + across * ty * ty;
+    ret[1][1] = stick + across * tx * tx;
+    ret[0][1] = ret[1][0] = -across * tx * ty;
+}
+
 void seat_hessian(const struct seat *seat, const double (*u)[3], int n, double ret[2][2])
 {
     const struct spring s = spring_of(seat, seat->normal_N[n], u, n);
     const double k = seat->stick_stiffness_N_mm[n];
-    memset(ret, 0, sizeof(double[2][2]));
-    if (s.r <= s.slip_r) {
-        ret[0][0] = ret[1][1] = k;
-        return;
-    }
-    const double across = k * s.slip_r / s.r, tx = s.dx / s.r, ty = s.dy / s.r;
-    ret[0][0] = across * ty * ty;
-    ret[1][1] = across * tx * tx;
-    ret[0][1] = ret[1][0] = -across * tx * ty;
+    seat_spring_hessian(k, k * s.slip_r, s.r > s.slip_r, (double[2]){s.dx, s.dy}, ret);
 }
 
 static void add_entry(double *values, int place, double value)
@@ -127,34 +138,12 @@ void seat_add_stiffness(const struct seat *seat, const struct assembly *a, const
 {
     double *values = linear_values(a->linear);
     for (int n = 0; n < seat->node_count; n++) {
-        if (seat->normal_N[n] <= 0) continue;
+        if (seat->normal_N[n] <= 0 || a->equation[n][2] >= a->seat_first) continue;
         double hessian[2][2];
         seat_hessian(seat, u, n, hessian);
         add_entry(values, a->diagonal[n][0], hessian[0][0]);
         add_entry(values, a->diagonal[n][1], hessian[1][1]);
         add_entry(values, a->tangential[n], hessian[0][1]);
-    }
-}
-
-bool seat_slip_direction(const struct seat *seat, const double (*u)[3], int n, double ret_t[2])
-{
-    if (seat->normal_N[n] <= 0) return false;
-    const struct spring s = spring_of(seat, seat->normal_N[n], u, n);
-    if (s.r <= s.slip_r) return false;
-    ret_t[0] = s.dx / s.r;
-    ret_t[1] = s.dy / s.r;
-    return true;
-}
-
-void seat_add_normal_change(const struct seat *seat, const struct assembly *a, const double (*u)[3],
-                            double *change_N)
-{
-    for (int n = 0; n < seat->node_count; n++) {
-        const int *eq = a->equation[n];
-        double t[2];
-        if (!seat_slip_direction(seat, u, n, t)) continue;
-        for (int c = 0; c < 2; c++)
-            if (eq[c] >= 0) change_N[eq[c]] += seat->friction * change_N[eq[2]] * t[c];
     }
 }
 

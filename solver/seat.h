@@ -40,6 +40,10 @@ static inline double seat_gap_mm(const struct mesh *mesh, const double (*u_mm)[3
     return mesh->X_mm[n][2] + u_mm[n][2];
 }
 
+/* Puts node n, which may touch, on the seat when it is below it, or above it by no more than
+ * rounding. */
+void seat_stop(const struct mesh *mesh, int n, double u_mm[3]);
+
 /* True when node n lies on the seat and is pressed against it by the energy's gradient there. */
 bool seat_binds(const struct mesh *mesh, const double (*u_mm)[3], const double (*force_N)[3],
                 int n);
@@ -51,23 +55,18 @@ double seat_energy(const struct seat *seat, const double (*u_mm)[3]);
 void seat_add_force(const struct seat *seat, const double *normal_N, const double (*u_mm)[3],
                     double (*force_N)[3]);
 
+/* Hessian of phi with respect to the stretch from the anchor, N/mm: of a spring of stiffness k
+ * that sticks, or of one that slips at limit_N = mu N. */
+void seat_spring_hessian(double stick_N_mm, double limit_N, bool slips, const double stretch_mm[2],
+                         double ret[2][2]);
+
 /* Hessian of seat_energy with respect to x and y of one node that presses on the seat, N/mm. */
 void seat_hessian(const struct seat *seat, const double (*u_mm)[3], int node, double ret[2][2]);
 
-/* Adds the Hessian of seat_energy to the values of assembly->linear. */
+/* Adds the Hessian of seat_energy to the values of assembly->linear, but for the nodes that rest on
+ * the seat, whose friction is contact.h's. */
 void seat_add_stiffness(const struct seat *seat, const struct assembly *assembly,
                         const double (*u_mm)[3]);
-
-/*
- * change_N[equation] holds the change of the forces that an increment makes without friction; its
- * entries at slipping nodes' z are changes of normal forces. Adds what they do to friction.
- */
-void seat_add_normal_change(const struct seat *seat, const struct assembly *assembly,
-                            const double (*u_mm)[3], double *change_N);
-
-/* True when node n slips; then ret_t is the direction of its friction force on the seat. */
-bool seat_slip_direction(const struct seat *seat, const double (*u_mm)[3], int node,
-                         double ret_t[2]);
 
 /*
  * Ends a load step: anchors of slipping nodes follow, those of nodes off the seat move along.

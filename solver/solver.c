@@ -31,13 +31,10 @@ static const double error_allowance = 0.005;
 /* Of the extrapolation's own correction, how much may be wrong. */
 static const double correction_doubt = 0.25;
 
-/* The starter leads from every third of its steps to the next: a finer mesh's cost far more. */
-static const int stride_of_starter = 3;
-
-/* Coarsest first; each leads the next along the load path. */
-enum { LEVEL_STARTER, LEVEL_COMPANION, LEVEL_MAIN, LEVEL_COUNT };
-static const struct mesh_divisions *const level_divisions[LEVEL_COUNT] = {
-    mesh_starters, mesh_companions, mesh_divisions};
+/* Coarsest first. */
+enum { LEVEL_COMPANION, LEVEL_MAIN, LEVEL_COUNT };
+static const struct mesh_divisions *const level_divisions[LEVEL_COUNT] = {mesh_companions,
+                                                                          mesh_divisions};
 
 struct ischia_solver {
     struct assembly assembly[ISCHIA_RESOLUTION_COUNT][LEVEL_COUNT]; /* made when first needed */
@@ -78,7 +75,6 @@ struct level {
     struct equilibrium state;
     struct assembly *assembly; /* the solver's */
     struct path_report report;
-    struct guide guide; /* for the next level */
     struct load_curve curve;
 };
 
@@ -94,7 +90,6 @@ struct solve {
 static void solve_finish(struct solve *s)
 {
     for (int l = 0; l < LEVEL_COUNT; l++) {
-        guide_finish(&s->level[l].guide);
         free(s->level[l].state.u_mm);
         seat_finish(&s->level[l].seat);
         body_finish(&s->level[l].body);
@@ -140,9 +135,8 @@ static const struct {
     double start;
     const char *message;
 } level_progress[LEVEL_COUNT + 1] = {
-    [LEVEL_STARTER] = {0, "pressing a coarse mesh on the seat"},
-    [LEVEL_COMPANION] = {0.1, "pressing a finer mesh on the seat"},
-    [LEVEL_MAIN] = {0.4, "pressing the tissue on the seat"},
+    [LEVEL_COMPANION] = {0, "pressing a coarse mesh on the seat"},
+    [LEVEL_MAIN] = {0.25, "pressing the tissue on the seat"},
     [LEVEL_COUNT] = {0.99, NULL},
 };
 
@@ -172,7 +166,7 @@ static double eps_max_of(const struct axis_strain *axis)
 
 /* One point of the load curve. */
 static enum ischia_code record_step(void *context, const struct equilibrium *state,
-                                    const struct path_point *point, struct ischia_error *err)
+                                    struct ischia_error *err)
 {
     struct solve *s = context;
     struct level *level = &s->level[s->current];
@@ -187,31 +181,21 @@ static enum ischia_code record_step(void *context, const struct equilibrium *sta
                                            .E_shear_max = most.green_lagrange_shear,
                                            .E_comp_max = most.green_lagrange_compression};
     load_curve_add(&level->curve, &load);
-    if (s->current == LEVEL_MAIN) return ISCHIA_OK;
-    const struct guide_point numbers = {.d_mm = point->d_mm,
-                                        .force_N = point->force_N,
-                                        .stiffness_N_mm = point->stiffness_N_mm,
-                                        .work_Nmm = point->work_Nmm};
-    return guide_record(&level->guide, &numbers, &level->body, &level->seat,
-                        (const double(*)[3])state->u_mm, err);
+    return ISCHIA_OK;
 }
 
 /*
  * Takes the main level's load curve as the result's, eps_max extrapolated to ever finer meshes: its
  * error falls with the square of the mesh size (docs/VERIFICATION.md), so with r the ratio of the
- * two sizes, eps = eps_main + (eps_main - eps_companion) / (r^2 - 1) (Richardson). Between the few
- * steps of these levels the curve follows the starter's. Returns the correction at the end of the
- * path; 0 where there is no companion.
+ * two sizes, eps = eps_main + (eps_main - eps_companion) / (r^2 - 1) (Richardson). Returns the
+ * correction at the end of the path; 0 where there is no companion.
  */
 static double extrapolate(struct solve *s)
 {
-    const struct level *starter = &s->level[LEVEL_STARTER];
-    struct level *companion = &s->level[LEVEL_COMPANION], *main = &s->level[LEVEL_MAIN];
+    const struct level *companion = &s->level[LEVEL_COMPANION], *main = &s->level[LEVEL_MAIN];
     const double ratio =
         (double)main->mesh.divisions.across / fmax(1, companion->mesh.divisions.across);
     double correction = 0;
-    load_curve_refine(&companion->curve, &starter->curve);
-    load_curve_refine(&main->curve, &starter->curve);
     for (int i = 0; i < main->curve.count; i++) {
         struct ischia_load_point *p = &s->result.load_curve[i];
         *p = main->curve.point[i];
@@ -346,43 +330,17 @@ static enum ischia_code keep_field(const struct level *level, struct ischia_fiel
     return ISCHIA_OK;
 }
 
-/* At rest again, as level_init leaves it. */
-static enum ischia_code level_reset(struct solve *s, struct level *level, struct ischia_error *err)
-{
-    seat_finish(&level->seat);
-    guide_finish(&level->guide);
-    TRY(seat_init(&level->seat, &level->mesh, s->c->option[ISCHIA_FRICTION], err));
-    memset(level->state.u_mm, 0, sizeof *level->state.u_mm * (size_t)level->mesh.node_count);
-    level->state = (struct equilibrium){.u_mm = level->state.u_mm};
-    level->curve.count = 0;
-    return ISCHIA_OK;
-}
-
-/* Follows the path, led by the level before; and once more without a guide where that ends short of
- * the force or loses energy, as it does when a long step lands on another branch. */
 static enum ischia_code solve_level(struct solve *s, int l, struct ischia_solver *solver,
                                     struct ischia_error *err)
 {
     const struct path_observer observer = {report_iteration, record_step, s};
-    const double force_N = quarter_force_N(s->c->param[ISCHIA_F]);
     struct level *level = &s->level[l];
     if (level_divisions[l][s->c->resolution].across == 0) return ISCHIA_OK;
     s->current = l;
     TRY(level_init(s, l, solver, err));
-    for (int attempt = 0; attempt < (l > 0 ? 2 : 1); attempt++) {
-        const struct guide *guide = attempt == 0 && l > 0 ? &s->level[l - 1].guide : NULL;
-        struct path_report report;
-        if (attempt > 0) TRY(level_reset(s, level, err));
-        TRY(path_follow(&level->body, level->assembly, &level->seat, force_N, guide, &observer,
-                        &level->state, &report, err));
-        report.newton_iterations += level->report.newton_iterations;
-        report.factorisations += level->report.factorisations;
-        level->report = report;
-        if (is_sound(&report)) break;
-    }
-    level->guide.complete = level->report.reason > 0;
-    level->guide.stride = l == 0 ? stride_of_starter : 1;
-    return ISCHIA_OK;
+    return path_follow(&level->body, level->assembly, &level->seat,
+                       quarter_force_N(s->c->param[ISCHIA_F]), &observer, &level->state,
+                       &level->report, err);
 }
 
 static enum ischia_code solve_run(struct solve *s, struct ischia_solver *solver,

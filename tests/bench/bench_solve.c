@@ -13,10 +13,12 @@
 #include <time.h>
 
 #include "solver/body.h"
+#include "solver/contact.h"
 #include "solver/solver.h"
 
-enum phase { ASSEMBLY, ENERGY, FACTORISATION, SOLVES, SETUP, PHASE_COUNT };
-static const char *const phase_names[] = {"assembly", "energy", "factor", "solve", "setup"};
+enum phase { ASSEMBLY, ENERGY, FACTORISATION, SOLVES, CONTACT, SETUP, PHASE_COUNT };
+static const char *const phase_names[] = {"assembly", "energy",  "factor",
+                                          "solve",    "contact", "setup"};
 
 static struct {
     double seconds;
@@ -76,15 +78,49 @@ enum ischia_code __wrap_linear_factor(struct linear *linear, const unsigned char
     return code;
 }
 
-enum ischia_code __real_linear_solve(struct linear *, int, double *, struct ischia_error *);
-enum ischia_code __wrap_linear_solve(struct linear *linear, int count, double *x,
-                                     struct ischia_error *err);
-enum ischia_code __wrap_linear_solve(struct linear *linear, int count, double *x,
-                                     struct ischia_error *err)
+enum ischia_code __real_linear_reduce(struct linear *linear, int count, double *x,
+                                      struct ischia_error *err);
+enum ischia_code __wrap_linear_reduce(struct linear *linear, int count, double *x,
+                                      struct ischia_error *err);
+enum ischia_code __wrap_linear_reduce(struct linear *linear, int count, double *x,
+                                      struct ischia_error *err)
 {
     const double since = cpu_seconds();
-    const enum ischia_code code = __real_linear_solve(linear, count, x, err);
+    const enum ischia_code code = __real_linear_reduce(linear, count, x, err);
     book(SOLVES, since);
+    return code;
+}
+
+enum ischia_code __real_linear_expand(struct linear *linear, double *x, struct ischia_error *err);
+enum ischia_code __wrap_linear_expand(struct linear *linear, double *x, struct ischia_error *err);
+enum ischia_code __wrap_linear_expand(struct linear *linear, double *x, struct ischia_error *err)
+{
+    const double since = cpu_seconds();
+    const enum ischia_code code = __real_linear_expand(linear, x, err);
+    book(SOLVES, since);
+    return code;
+}
+
+bool __real_contact_solve(struct contact *contact, const struct seat *seat, const double (*u_mm)[3],
+                          enum contact_friction friction, double *du, double *dd, double *normal_N);
+bool __wrap_contact_solve(struct contact *contact, const struct seat *seat, const double (*u_mm)[3],
+                          enum contact_friction friction, double *du, double *dd, double *normal_N);
+bool __wrap_contact_solve(struct contact *contact, const struct seat *seat, const double (*u_mm)[3],
+                          enum contact_friction friction, double *du, double *dd, double *normal_N)
+{
+    const double since = cpu_seconds();
+    const bool code = __real_contact_solve(contact, seat, u_mm, friction, du, dd, normal_N);
+    book(CONTACT, since);
+    return code;
+}
+
+bool __real_contact_is_stable(struct contact *contact, const struct seat *seat);
+bool __wrap_contact_is_stable(struct contact *contact, const struct seat *seat);
+bool __wrap_contact_is_stable(struct contact *contact, const struct seat *seat)
+{
+    const double since = cpu_seconds();
+    const bool code = __real_contact_is_stable(contact, seat);
+    book(CONTACT, since);
     return code;
 }
 

@@ -335,116 +335,6 @@ static void axis_runs_down_from_the_tip(void **state)
     mesh_finish(&m);
 }
 
-/* --- prolongation ----------------------------------------------------------------------------- */
-
-/* The blocks' vertices: core, x patch, y patch by their corners (0,0), (1,0), (1,1), (0,1). */
-enum { CORE, PATCH_X, PATCH_Y, PATCHES, VERTICES = 7 };
-static const int vertices[PATCHES][4] = {{0, 1, 2, 3}, {1, 2, 5, 4}, {3, 2, 5, 6}};
-
-static double vertex_value(int vertex, int level, int component)
-{
-    return sin(1.7 * vertex + 3.1 * level + 0.9 * component + 0.4);
-}
-
-/* Trilinear between the vertices of two levels: 0 the bone, 1 the muscle's bottom, 2 the fat's, 3
- * the seat. */
-static void put(double *ret, int patch, double a, double b, int level, double share)
-{
-    for (int k = 0; k < 3; k++) {
-        double at[2];
-        for (int s = 0; s < 2; s++) {
-            const int *v = vertices[patch];
-            at[s] = (1 - a) * (1 - b) * vertex_value(v[0], level + s, k) +
-                    a * (1 - b) * vertex_value(v[1], level + s, k) +
-                    a * b * vertex_value(v[2], level + s, k) +
-                    (1 - a) * b * vertex_value(v[3], level + s, k);
-        }
-        ret[k] = (1 - share) * at[0] + share * at[1];
-    }
-}
-
-static void put_muscle(const struct mesh *m, double (*field)[3])
-{
-    const struct mesh_divisions *d = &m->divisions;
-    /* (i, j) of the corners of a cell; in patch x the two run in the other sense. */
-    static const int step[2][4][2] = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}},
-                                      {{0, 0}, {0, 1}, {1, 1}, {1, 0}}};
-    int e = 0;
-    for (int l = 0; l < d->radial; l++)
-        for (int p = 0; p < PATCHES; p++) {
-            const int rows = p == CORE ? d->across : d->around;
-            for (int cell = 0; cell < rows * d->across; cell++, e++)
-                for (int corner = 0; corner < 8; corner++) {
-                    const int *s = step[p == PATCH_X][corner % 4];
-                    const int i = cell % d->across, j = cell / d->across;
-                    const double a = (i + s[0]) / (double)d->across;
-                    const double b = (j + s[1]) / (double)rows;
-                    const double share = (double)(corner < 4 ? l + 1 : l) / d->radial;
-                    put(field[m->hex[e][corner]], p, a, b, 0, share);
-                }
-        }
-}
-
-static void put_columns(const struct mesh *m, double (*field)[3])
-{
-    const struct mesh_divisions *d = &m->divisions;
-    static const int step[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-    int e = m->muscle_count;
-    for (int layer = 0; layer < d->fat + d->skin; layer++)
-        for (int cell = 0; cell < d->across * d->across; cell++, e++)
-            for (int corner = 0; corner < 8; corner++) {
-                const int *s = step[corner % 4];
-                const int i = cell % d->across, j = cell / d->across;
-                const double a = (i + s[0]) / (double)d->across;
-                const double b = (j + s[1]) / (double)d->across;
-                const int depth = corner < 4 ? layer + 1 : layer;
-                if (depth <= d->fat)
-                    put(field[m->hex[e][corner]], CORE, a, b, 1, (double)depth / d->fat);
-                else
-                    put(field[m->hex[e][corner]], CORE, a, b, 2,
-                        (double)(depth - d->fat) / d->skin);
-            }
-}
-
-/* A field that is linear along each block's coordinates and continuous between blocks. */
-static double (*block_linear_field(const struct mesh *m))[3]
-{
-    double(*field)[3] = calloc((size_t)m->node_count, sizeof *field);
-    assert_non_null(field);
-    put_muscle(m, field);
-    put_columns(m, field);
-    return field;
-}
-
-static void check_prolongation(const struct mesh_divisions *from, const struct mesh_divisions *to)
-{
-    const struct ischia_case c = usual_case();
-    struct mesh f = mesh_of(&c, from), t = mesh_of(&c, to);
-    double(*given)[3] = block_linear_field(&f), (*expected)[3] = block_linear_field(&t);
-    double(*got)[3] = malloc((size_t)t.node_count * sizeof *got);
-    assert_non_null(got);
-    for (int n = 0; n < t.node_count; n++)
-        for (int k = 0; k < 3; k++) got[n][k] = (double)NAN; /* every node must be written */
-    mesh_local_prolong(from, (const double(*)[3])given, to, got);
-    for (int n = 0; n < t.node_count; n++)
-        for (int k = 0; k < 3; k++) assert_near(got[n][k], expected[n][k], 1e-13);
-    free(given);
-    free(expected);
-    free(got);
-    mesh_finish(&f);
-    mesh_finish(&t);
-}
-
-static void prolongation_is_exact_for_block_linear_fields(void **state)
-{
-    (void)state;
-    for (int r = 0; r < ISCHIA_RESOLUTION_COUNT; r++) {
-        check_prolongation(&mesh_divisions[r], &odd_divisions);
-        check_prolongation(&odd_divisions, &mesh_divisions[r]);
-        check_prolongation(&mesh_divisions[ISCHIA_COARSE], &mesh_divisions[r]);
-    }
-}
-
 static void finish_takes_an_empty_mesh(void **state)
 {
     (void)state;
@@ -492,7 +382,6 @@ int main(void)
         cmocka_unit_test(seat_quads_cover_the_outside),
         cmocka_unit_test(seat_quads_face_outward),
         cmocka_unit_test(axis_runs_down_from_the_tip),
-        cmocka_unit_test(prolongation_is_exact_for_block_linear_fields),
         cmocka_unit_test(finish_takes_an_empty_mesh),
         cmocka_unit_test(damage_is_found),
     };

@@ -158,7 +158,8 @@ static void tangent_is_the_derivative_of_equilibria(void **state)
     struct newton_tangent tangent = {.direction = direction, .normal_rate_N_mm = rate};
     for (int step = 1; step <= 4; step++) press_to(&b, at * step / 4);
     newton_linearise(b.newton, &b.state);
-    if (newton_tangent(b.newton, &tangent, &err) != ISCHIA_OK) fail_msg("%s", err.message);
+    if (newton_tangent(b.newton, &b.state, &tangent, &err) != ISCHIA_OK)
+        fail_msg("%s", err.message);
     press_to(&b, at - h);
     const double below_N = b.state.force_N;
     memcpy(u, b.state.u_mm, nodes * sizeof *u);

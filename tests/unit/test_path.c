@@ -45,13 +45,11 @@ static bool on_iteration(void *context, int load_step, int newton_iteration, dou
 }
 
 static enum ischia_code on_step(void *context, const struct equilibrium *state,
-                                const struct path_point *point, struct ischia_error *err)
+                                struct ischia_error *err)
 {
     struct log *l = context;
     CHECK(l->steps != l->fail_at_step, err, ISCHIA_E_IO, "the log is full");
     assert_true(state->d_mm > l->d_mm && state->force_N > 0);
-    assert_true(point->d_mm == state->d_mm && point->force_N == state->force_N);
-    assert_true(point->work_Nmm > 0);
     l->d_mm = state->d_mm;
     l->force_N = state->force_N;
     l->steps++;
@@ -62,8 +60,8 @@ static enum ischia_code follow(struct bench *b, double force_N, struct log *log,
                                struct path_report *ret_report, struct ischia_error *err)
 {
     const struct path_observer observer = {on_iteration, on_step, log};
-    return path_follow(&b->body, &b->assembly, &b->seat, force_N, NULL,
-                       log != NULL ? &observer : NULL, &b->state, ret_report, err);
+    return path_follow(&b->body, &b->assembly, &b->seat, force_N, log != NULL ? &observer : NULL,
+                       &b->state, ret_report, err);
 }
 
 static void path_ends_at_the_force(void **state)

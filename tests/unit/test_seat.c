@@ -99,21 +99,6 @@ static void hessian_is_the_gradient_of_the_force(void **state)
     }
 }
 
-static void slip_has_a_direction(void **state)
-{
-    (void)state;
-    struct toy t;
-    toy_init(&t);
-    double direction[2] = {7, 7};
-    assert_false(seat_slip_direction(&t.seat, at(&t), STICKS, direction));
-    assert_false(seat_slip_direction(&t.seat, at(&t), FREE, direction));
-    assert_false(seat_slip_direction(&t.seat, at(&t), RESTS, direction));
-    assert_true(direction[0] == 7 && direction[1] == 7);
-    assert_true(seat_slip_direction(&t.seat, at(&t), SLIPS, direction));
-    assert_near(direction[0], 0.6, 1e-12);
-    assert_near(direction[1], -0.8, 1e-12);
-}
-
 /* After a step the slipping spring is stretched to just its limit, and its force is as before. */
 static void advance_moves_the_anchors(void **state)
 {
@@ -204,45 +189,39 @@ static void binding_needs_seat_contact_and_pressure(void **state)
     box_mesh_free(&mesh);
 }
 
-/* The matrix gets each node's Hessian; a change of contact force is felt where nodes slip. */
-static void assembled_parts_are_those_of_the_nodes(void **state)
+/* The matrix gets the Hessian of a node that has come to the seat; of one that rests there, whose
+ * friction belongs to the condensed system, it gets nothing. */
+static void matrix_gets_the_nodes_that_come_to_the_seat(void **state)
 {
     (void)state;
-    struct mesh mesh = box_mesh(&small);
-    struct seat seat = seat_of(&mesh);
-    struct assembly a = {0};
-    assert_int_equal(assembly_init(&a, &mesh, NULL), ISCHIA_OK);
-    double(*u)[3] = box_alloc((size_t)mesh.node_count, sizeof *u);
-    double *x = box_alloc((size_t)a.n, sizeof *x), *y = box_alloc((size_t)a.n, sizeof *y);
-    const int node = box_node(&small, 1, 1, 0);
-    const int *eq = a.equation[node];
-    double hessian[2][2], direction[2];
-    u[node][0] = 0.3;
-    u[node][1] = 0.4;
-    seat.normal_N[node] = 0.25;
-    linear_clear(a.linear);
-    seat_add_stiffness(&seat, &a, (const double(*)[3])u);
-    seat_hessian(&seat, (const double(*)[3])u, node, hessian);
-    for (int c = 0; c < 2; c++) {
-        x[eq[c]] = 1;
-        linear_multiply(a.linear, x, y);
-        x[eq[c]] = 0;
-        for (int k = 0; k < 2; k++) assert_near(y[eq[k]], hessian[k][c], 1e-14);
-        assert_true(y[eq[2]] == 0);
+    static const struct box tall = {{2, 2, 2}, {4, 6, 3}, 0, 0};
+    static const int heights[] = {0, 1};
+    for (int h = 0; h < 2; h++) {
+        struct mesh mesh = box_mesh(&tall);
+        struct seat seat = seat_of(&mesh);
+        struct assembly a = {0};
+        const int node = box_node(&tall, 1, 1, heights[h]);
+        mesh.node_flags[node] |= NODE_ON_SEAT;
+        seat.stick_stiffness_N_mm[node] = 2;
+        assert_int_equal(assembly_init(&a, &mesh, NULL), ISCHIA_OK);
+        double(*u)[3] = box_alloc((size_t)mesh.node_count, sizeof *u);
+        double hessian[2][2];
+        u[node][0] = 0.3;
+        u[node][1] = 0.4;
+        seat.normal_N[node] = 0.25;
+        linear_clear(a.linear);
+        seat_add_stiffness(&seat, &a, (const double(*)[3])u);
+        seat_hessian(&seat, (const double(*)[3])u, node, hessian);
+        const double *values = linear_values(a.linear), share = heights[h] > 0;
+        for (int c = 0; c < 2; c++)
+            assert_near(values[a.diagonal[node][c]], share * hessian[c][c], 1e-15);
+        assert_near(values[a.tangential[node]], share * hessian[0][1], 1e-15);
+        assert_true(values[a.diagonal[node][2]] == 0);
+        free(u);
+        assembly_finish(&a);
+        seat_finish(&seat);
+        box_mesh_free(&mesh);
     }
-    assert_true(seat_slip_direction(&seat, (const double(*)[3])u, node, direction));
-    x[eq[2]] = 3;
-    seat_add_normal_change(&seat, &a, (const double(*)[3])u, x);
-    for (int c = 0; c < 2; c++) assert_near(x[eq[c]], friction * 3 * direction[c], 1e-14);
-    double others = 0;
-    for (int i = 0; i < a.n; i++) others += fabs(x[i]);
-    assert_near(others, 3 + friction * 3 * (0.6 + 0.8), 1e-13);
-    free(u);
-    free(x);
-    free(y);
-    assembly_finish(&a);
-    seat_finish(&seat);
-    box_mesh_free(&mesh);
 }
 
 int main(void)
@@ -251,12 +230,11 @@ int main(void)
         cmocka_unit_test(potential_is_that_of_the_header),
         cmocka_unit_test(force_is_the_gradient_and_obeys_coulomb),
         cmocka_unit_test(hessian_is_the_gradient_of_the_force),
-        cmocka_unit_test(slip_has_a_direction),
         cmocka_unit_test(advance_moves_the_anchors),
         cmocka_unit_test(without_friction_nothing_pulls),
         cmocka_unit_test(springs_belong_to_areas),
         cmocka_unit_test(binding_needs_seat_contact_and_pressure),
-        cmocka_unit_test(assembled_parts_are_those_of_the_nodes),
+        cmocka_unit_test(matrix_gets_the_nodes_that_come_to_the_seat),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "solver/dense.h"
+
 /* The seat's friction springs are made this much stiffer, so that what sticks hardly moves. */
 static const double stick_stiffening = 50;
 
@@ -106,21 +108,42 @@ static void move_bone(struct bench *b, double d_mm)
         if (b->mesh.node_flags[n] & (NODE_ON_BONE | NODE_ON_PLATE)) b->state.u_mm[n][2] = -d_mm;
 }
 
+/* In two halves, from the state given: a step that is too far at once. */
+static enum ischia_code press_in_halves(struct bench *b, double before_mm, double d_mm,
+                                        struct ischia_error *err)
+{
+    CHECK(d_mm - before_mm > 1e-3, err, ISCHIA_E_NUMERIC, "no equilibrium at d = %g mm", d_mm);
+    TRY(bench_press(b, (before_mm + d_mm) / 2, err));
+    return bench_press(b, d_mm, err);
+}
+
 enum ischia_code bench_press(struct bench *b, double d_mm, struct ischia_error *err)
 {
     const struct newton_control control = {.force_N = 1, .tolerance = 1e-9, .iterations_max = 200};
+    const size_t nodes = (size_t)b->mesh.node_count;
     const double before_mm = b->state.d_mm;
-    struct newton_report report;
-    move_bone(b, d_mm);
-    if (!(body_det_F_min(&b->body, (const double(*)[3])b->state.u_mm) > 0)) { /* too far at once */
-        move_bone(b, before_mm);
-        TRY(bench_press(b, (before_mm + d_mm) / 2, err));
-        return bench_press(b, d_mm, err);
+    struct newton_report report = {.reason = ISCHIA_NOT_STARTED};
+    double(*u)[3] = malloc(nodes * sizeof *u), *normal_N = malloc(nodes * sizeof *normal_N);
+    enum ischia_code code = ISCHIA_OK;
+    if (u == NULL || normal_N == NULL) {
+        code = FAIL(err, ISCHIA_E_MEMORY, "not enough memory for a step");
+        goto out;
     }
-    TRY(newton_minimise(b->newton, &b->state, &control, NULL, NULL, &report, err));
-    CHECK(report.reason > 0, err, ISCHIA_E_NUMERIC, "at d = %g mm: %s, residual %g", d_mm,
-          ischia_reason_name(report.reason), report.residual);
-    return ISCHIA_OK;
+    memcpy(u, b->state.u_mm, nodes * sizeof *u);
+    memcpy(normal_N, b->seat.normal_N, nodes * sizeof *normal_N);
+    move_bone(b, d_mm);
+    if (body_det_F_min(&b->body, (const double(*)[3])b->state.u_mm) > 0)
+        code = newton_minimise(b->newton, &b->state, &control, NULL, NULL, &report, err);
+    if (code != ISCHIA_OK || report.reason > 0) goto out;
+    memcpy(b->state.u_mm, u, nodes * sizeof *u);
+    memcpy(b->seat.normal_N, normal_N, nodes * sizeof *normal_N);
+    b->state.d_mm = before_mm;
+    newton_linearise(b->newton, &b->state);
+    code = press_in_halves(b, before_mm, d_mm, err);
+out:
+    free(u);
+    free(normal_N);
+    return code;
 }
 
 double bench_end_step(struct bench *b)
@@ -132,6 +155,25 @@ double bench_end_step(struct bench *b)
     return dissipated;
 }
 
+/* What the seat would be asked for, were there one: the condensed equations, as they are. */
+static enum ischia_code solve_tail(const struct assembly *a, double *x, struct ischia_error *err)
+{
+    const size_t rows = (size_t)(a->n - a->seat_first);
+    double *S = malloc(sizeof *S * (rows * rows + 1));
+    int *pivot = malloc(sizeof *pivot * (rows + 1));
+    enum ischia_code code = ISCHIA_OK;
+    if (S == NULL || pivot == NULL) {
+        code = FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the condensed equations");
+    } else {
+        linear_condensed(a->linear, S);
+        if (!dense_solve((int)rows, S, pivot, x))
+            code = FAIL(err, ISCHIA_E_NUMERIC, "the condensed equations are singular");
+    }
+    free(S);
+    free(pivot);
+    return code;
+}
+
 /* Adds the solution of one Newton step to the state; its right-hand side is given. */
 static enum ischia_code apply_step(struct bench *b, double *rhs, struct ischia_error *err)
 {
@@ -139,7 +181,9 @@ static enum ischia_code apply_step(struct bench *b, double *rhs, struct ischia_e
     TRY(linear_factor(b->assembly.linear, NULL, &outcome, err));
     CHECK(outcome == LINEAR_FACTORED, err, ISCHIA_E_NUMERIC,
           "the tangent is not positive definite");
-    TRY(linear_solve(b->assembly.linear, 1, rhs, err));
+    TRY(linear_reduce(b->assembly.linear, 1, rhs, err));
+    TRY(solve_tail(&b->assembly, rhs + b->assembly.seat_first, err));
+    TRY(linear_expand(b->assembly.linear, rhs, err));
     for (int n = 0; n < b->mesh.node_count; n++)
         for (int c = 0; c < 3; c++)
             if (b->assembly.equation[n][c] >= 0)

@@ -5,8 +5,7 @@
  * is varied with the others at their shipped values; nothing but these numbers changes from run to
  * run. A last line takes the load path, whose friction history depends on the steps, in SMALL_STEPS
  * equal steps to the same travel; it and its change are of the resolution's own mesh, the others'
- * eps_max is extrapolated with the companion mesh as ischia_solve does. Meshes go their paths
- * without a guide here, which leaves eps_max within path_effect of ischia_solve's.
+ * eps_max is extrapolated with the companion mesh as ischia_solve does.
  *
  * usage: study_regularisation RESOLUTION SIDE ...    e.g. study_regularisation standard 1R 9R
  * Fails when the shipped values are not those of ischia_solve, a run does not converge, or when
@@ -111,7 +110,7 @@ static enum ischia_code solve_on(const struct mesh_divisions *divisions,
     enum ischia_code code = run_init(&r, c, divisions, v, err);
     if (code == ISCHIA_OK)
         code = path_follow(&r.body, &r.assembly, &r.seat, quarter_force_N(c->param[ISCHIA_F]), NULL,
-                           NULL, &r.state, &ret->path, err);
+                           &r.state, &ret->path, err);
     if (code == ISCHIA_OK) measure(&r, ret);
     run_finish(&r);
     return code;
