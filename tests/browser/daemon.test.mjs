@@ -156,7 +156,7 @@ test('cancel stops a solve', async () => {
 });
 
 test('the daemon is killed in the middle of a solve, comes back, and the page recovers', async () => {
-  const ids = await submit_sample('202,5');
+  const ids = await submit_sample('202,5', 'standard'); /* a coarse one may be over too soon */
   await page.locator('.running').first().waitFor();
   await daemon.end('SIGKILL');
   await page.locator('.lost').first().waitFor();
