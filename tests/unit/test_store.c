@@ -105,6 +105,8 @@ static void test_recovery_requeues_what_ran(void **state)
     const struct store_claim b = claim_one(room->store);
     struct ischia_error err;
     int requeued = 0;
+    store_close(room->store); /* on a server, what a living daemon runs stays its own */
+    open_room(room);
     assert_int_equal(store_recover(room->store, &requeued, &err), ISCHIA_OK);
     assert_int_equal(requeued, 2);
     assert_int_equal(state_of(room->store, &a.id), QUEUE_QUEUED);
@@ -257,6 +259,7 @@ static bool store_holds(const struct room *room, const char *text)
 static void test_erased_leaves_no_byte(void **state)
 {
     struct room *room = *state;
+    if (test_server() != NULL) return; /* the bytes are the server's: docs/INVARIANTS.md, I11 */
     struct store_new what = request(1);
     what.subject = "SECRET-SUBJECT";
     what.label = "SECRET-LABEL";

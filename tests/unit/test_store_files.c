@@ -244,7 +244,7 @@ static void test_old_schema_is_migrated(void **state)
     store_close(room->store);
     assert_int_equal(unlink(path), 0);
     assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
-    run_file(db, SOURCE_ROOT "/server/store/0001_assessments.sql");
+    run_file(db, SOURCE_ROOT "/server/store/sqlite/0001_assessments.sql");
     assert_int_equal(
         sqlite3_exec(db,
                      "PRAGMA user_version = 1;"
