@@ -53,6 +53,7 @@ struct arguments {
     int flag_count;
     char **words;
     int word_count;
+    char *from, *to; /* of `store migrate`; NULL: not given */
     enum action action;
 };
 
@@ -106,6 +107,10 @@ static int parse_flag(struct arguments *ret, char **argv, int left, struct ischi
         ret->config_path = value;
         return used;
     }
+    if (strcmp(name, "from") == 0 || strcmp(name, "to") == 0) {
+        *(name[0] == 'f' ? &ret->from : &ret->to) = value;
+        return used;
+    }
     ret->flags[2 * ret->flag_count] = name;
     ret->flags[2 * ret->flag_count + 1] = value;
     ret->flag_count++;
@@ -127,6 +132,9 @@ static enum ischia_code parse_arguments(struct arguments *ret, int argc, char **
         if (used == 0) return err->code;
         i += used;
     }
+    /* they took two words each */
+    if (ret->from != NULL) ret->words[ret->word_count++] = ret->from;
+    if (ret->to != NULL) ret->words[ret->word_count++] = ret->to;
     return ISCHIA_OK;
 }
 
