@@ -33,7 +33,8 @@ enum sql {
     SQL_SOLUTION_FIND,
     SQL_SOLUTION_ADD,
     SQL_SOLUTION_DROP,
-    SQL_TALLY,
+    SQL_QUEUED,
+    SQL_ACCEPT_LOOK,
     SQL_TALLY_ALL,
     SQL_OLDEST_QUEUED,
     SQL_ACCEPT,
@@ -262,6 +263,11 @@ struct store {
     pthread_cond_t write_ready;
     struct write *first, **last; /* waiting, in order */
     bool closing;
+    struct audit_head { /* the writer thread's, within one transaction */
+        bool known;
+        int64_t seq;
+        unsigned char hash[STORE_DIGEST_BYTES];
+    } audit_head;
     bool scrub; /* erased bytes are still in the engine's log; the writer thread's alone */
     uint64_t writes, commits, write_failures, audit_failures;
     uint64_t latency_count[STORE_LATENCY_BUCKETS];

@@ -15,8 +15,8 @@
  * keys, the change log, tokens and the audit chain. Nothing in this header knows the engine behind
  * it.
  *
- * Any number of daemons on any machines may share a store on a server. Each holds a lease on what it
- * runs for as long as it says every second that it lives; what belongs to nobody alive goes back
+ * Any number of daemons on any machines may share a store on a server. Each holds a lease on what
+ * it runs for as long as it says every second that it lives; what belongs to nobody alive goes back
  * into the queue within STORE_LEASE_MS and some, and whoever ran it can then no longer end it.
  *
  * Threads: every function may be called from any thread at any time between open and close. Writes
@@ -265,14 +265,15 @@ ISCHIA_MUST_CHECK enum ischia_code
 store_cancel(struct store *store, const struct uuid *id, enum queue_state *ret_was,
              enum store_answer *ret_answer, struct ischia_error *err);
 
-/* At start, before the first claim: every running one that no living daemon holds -> queued, attempts
- * and crashes kept. */
+/* At start, before the first claim: every running one that no living daemon holds -> queued,
+ * attempts and crashes kept. */
 ISCHIA_MUST_CHECK enum ischia_code store_recover(struct store *store, int *ret_requeued,
                                                  struct ischia_error *err);
 
 /* Erases an assessment, its idempotency keys, and its result and field unless another assessment
- * of the same case still uses them. In a file the bytes are overwritten, in its log too; on a server
- * when that cleans up. The change log keeps the id and "erased". STORE_CONFLICT while it runs. */
+ * of the same case still uses them. In a file the bytes are overwritten, in its log too; on a
+ * server they go when that cleans up. The change log keeps the id and "erased". STORE_CONFLICT
+ * while it runs. */
 ISCHIA_MUST_CHECK enum ischia_code store_erase(struct store *store, const struct uuid *id,
                                                enum store_answer *ret_answer,
                                                struct ischia_error *err);
@@ -469,8 +470,8 @@ struct store_watcher {
     void (*on_lease_lost)(void *context);
 };
 
-/* From now on the watcher is told; *watcher is copied. NULL: no longer, and when this returns none of
- * its functions is running. Does nothing where no other daemon can be. */
+/* From now on the watcher is told; *watcher is copied. NULL: no longer, and when this returns none
+ * of its functions is running. Does nothing where no other daemon can be. */
 void store_watch(struct store *store, const struct store_watcher *watcher);
 
 /* Tells the watchers of other daemons; the latest of each id, a few times a second. */

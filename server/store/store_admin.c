@@ -167,21 +167,21 @@ static void chain(const unsigned char before[STORE_DIGEST_BYTES], const struct s
     digest_parts(parts, sizeof parts / sizeof parts[0], ret_hash);
 }
 
-static enum ischia_code audit_head(struct db *db, int64_t *ret_seq,
-                                   unsigned char ret_hash[STORE_DIGEST_BYTES],
-                                   struct ischia_error *err)
+/* Asked once in a transaction: nobody else writes meanwhile. */
+static enum ischia_code find_head(struct db *db, struct audit_head *head, struct ischia_error *err)
 {
     struct query query;
     bool row = false;
-    *ret_seq = 0;
-    memset(ret_hash, 0, STORE_DIGEST_BYTES);
+    if (head->known) return ISCHIA_OK;
+    *head = (struct audit_head){0};
     query_begin(&query, db, SQL_AUDIT_HEAD);
     enum ischia_code code = query_step(&query, &row, err);
     if (code == ISCHIA_OK && row) {
-        *ret_seq = query_integer(&query, 0);
-        code = query_blob(&query, 1, ret_hash, STORE_DIGEST_BYTES, err);
+        head->seq = query_integer(&query, 0);
+        code = query_blob(&query, 1, head->hash, STORE_DIGEST_BYTES, err);
     }
     query_end(&query);
+    head->known = code == ISCHIA_OK;
     return code;
 }
 
@@ -189,11 +189,12 @@ static enum ischia_code audit_run(struct store *store, struct db *db, void *oper
                                   struct ischia_error *err)
 {
     struct store_audit *row = operation;
-    unsigned char before[STORE_DIGEST_BYTES];
-    TRY(audit_head(db, &row->seq, before, err));
-    row->seq++;
+    struct audit_head *head = &store->audit_head;
+    TRY(find_head(db, head, err));
+    row->seq = ++head->seq;
     row->at_ms = store_now_ms(store);
-    chain(before, row, row->hash);
+    chain(head->hash, row, row->hash);
+    memcpy(head->hash, row->hash, STORE_DIGEST_BYTES);
     struct query query;
     query_begin(&query, db, SQL_AUDIT_ADD);
     query_put_integer(&query, row->seq);

@@ -40,11 +40,26 @@ static enum ischia_code count_queued(struct db *db, int *ret, struct ischia_erro
 {
     struct query query;
     int64_t queued = 0;
-    query_begin(&query, db, SQL_TALLY);
-    query_put_integer(&query, QUEUE_QUEUED);
+    query_begin(&query, db, SQL_QUEUED);
     TRY(query_number(&query, 0, &queued, err));
     *ret = (int)queued;
     return ISCHIA_OK;
+}
+
+/* find_solution and count_queued at once. */
+static enum ischia_code look_before_accepting(struct db *db, const unsigned char *case_key,
+                                              int64_t *ret_rowid, int *ret_queued,
+                                              struct ischia_error *err)
+{
+    struct query query;
+    bool row = false;
+    query_begin(&query, db, SQL_ACCEPT_LOOK);
+    query_put_blob(&query, case_key, STORE_DIGEST_BYTES);
+    const enum ischia_code code = query_step(&query, &row, err);
+    *ret_queued = code == ISCHIA_OK && row ? (int)query_integer(&query, 0) : 0;
+    *ret_rowid = code == ISCHIA_OK && row ? query_integer(&query, 1) : 0;
+    query_end(&query);
+    return code;
 }
 
 /* ---------------------------------------------------------------------------- accepting */
@@ -169,8 +184,7 @@ static enum ischia_code accept_run(struct store *store, struct db *db, void *ope
     if (answered) return count_queued(db, &accept->accepted.queued, err);
     int64_t solution = 0;
     int queued = 0;
-    TRY(find_solution(db, accept->what.case_key, &solution, err));
-    TRY(count_queued(db, &queued, err));
+    TRY(look_before_accepting(db, accept->what.case_key, &solution, &queued, err));
     const int queued_max = accept->what.queued_max;
     if (solution == 0 && queued_max > 0 && queued >= queued_max) {
         accept->accepted.acceptance = STORE_FULL;

@@ -8,8 +8,8 @@
 
 #include "server/store/engine.h"
 
-/* In an order in which what is referred to comes first. kinds: one letter a column, i integer, n the
- * same or NULL, t text, b bytes. `number`: the column that the engine numbers by itself, or NULL. */
+/* In an order in which what is referred to comes first. kinds: one letter a column, i integer, n
+ * the same or NULL, t text, b bytes. `number`: the column that the engine numbers by itself. */
 static const struct table {
     const char *name, *columns, *kinds, *number;
 } tables[] = {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * The engine on a PostgreSQL server, for any number of daemons. Tables are in a schema of their own,
- * "ischia", of the database that the location names: one store a database.
+ * The engine on a PostgreSQL server, for any number of daemons. Tables are in a schema of their
+ * own, "ischia", of the database that the location names: one store a database.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -65,8 +65,8 @@ static enum ischia_code apply(struct db *db, int64_t from, struct ischia_error *
     return pg_execute(db, mark, NULL, err);
 }
 
-/* A daemon brings an older store to its own schema; those of the older version are refused from then
- * on. A short-lived command does so only where no daemon is. */
+/* A daemon brings an older store to its own schema; those of the older version are refused from
+ * then on. A short-lived command does so only where no daemon is. */
 static enum ischia_code migrate_locked(struct db *db, enum store_mode mode,
                                        struct ischia_error *err)
 {

@@ -4,8 +4,8 @@
  *
  * A connection that is lost comes back at its next use outside a transaction, never within one:
  * what is left of a transaction must not run on another connection, where each of its statements
- * would be a transaction of its own. A commit counts only when the server has called it COMMIT: of a
- * transaction that has failed it says ROLLBACK, and calls that a success.
+ * would be a transaction of its own. A commit counts only when the server has called it COMMIT: of
+ * a transaction that has failed it says ROLLBACK, and calls that a success.
  */
 #include <assert.h>
 #include <poll.h>
@@ -239,8 +239,8 @@ void pg_close(struct db *db)
 bool pg_is_in_transaction(const struct db *db) { return own_of_const(db)->in_transaction; }
 
 /* Writers come one after the other, on all machines: what one has numbered is then committed before
- * the next takes a number. READ COMMITTED, so that each statement sees what the one before it in the
- * queue has committed. */
+ * the next takes a number. READ COMMITTED, so that each statement sees what those before have
+ * committed. */
 static enum ischia_code begin_once(struct db *db, int64_t *ret_version, struct ischia_error *err)
 {
     TRY(pg_ensure(db, NULL, err));

@@ -4,10 +4,10 @@
  *
  * Each daemon has a row in the table of the living, and says every second, by the server's clock,
  * that it lives. Whoever finds a row that is older than a lease removes it and puts what its daemon
- * ran back into the queue; work that belongs to no row (a claim whose daemon died in the commit) goes
- * back as well. A daemon that finds its own row gone, after a pause or a cut cable, enters itself
- * anew and stops what it ran: the store refuses what would come of it, because the number of the
- * owner is part of what must match (SQL_STATE, SQL_STUDY_POINT_GET).
+ * ran back into the queue; work that belongs to no row (a claim whose daemon died in the commit)
+ * goes back as well. A daemon that finds its own row gone, after a pause or a cut cable, enters
+ * itself anew and stops what it ran: the store refuses what would come of it, because the number of
+ * the owner is part of what must match (SQL_STATE, SQL_STUDY_POINT_GET).
  *
  * What the others did is read from the change log; notifications only say that it is worth looking
  * now. One that is lost costs a second, never a change.

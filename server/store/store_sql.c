@@ -31,7 +31,10 @@ const struct sql_text sql_text[SQL_COUNT] = {
     [SQL_SOLUTION_DROP] =
         {"DELETE FROM solution WHERE rowid = ?1 AND NOT EXISTS (SELECT 1 FROM assessment "
          "WHERE solution = ?1)"},
-    [SQL_TALLY] = {"SELECT n FROM tally WHERE state = ?"},
+    [SQL_QUEUED] = {"SELECT n FROM tally WHERE state = 0"},
+    /* what accepting must know, in one question */
+    [SQL_ACCEPT_LOOK] = {"SELECT n, (SELECT rowid FROM solution WHERE case_key = ?) FROM tally "
+                         "WHERE state = 0"},
     [SQL_TALLY_ALL] = {"SELECT state, n FROM tally"},
     [SQL_OLDEST_QUEUED] =
         {"SELECT created_ms FROM assessment WHERE state = 0 ORDER BY seq LIMIT 1"},

@@ -90,6 +90,7 @@ struct sqlite_place {
     int lock_fd; /* -1 when not held */
 };
 
+/* store_backup and store_restore (store.h). */
 enum ischia_code sqlite_backup(struct store *store, const char *path, struct ischia_error *err);
 enum ischia_code sqlite_restore(const char *location, const char *path, struct ischia_error *err);
 

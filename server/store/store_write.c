@@ -34,6 +34,7 @@ static enum ischia_code run_one(struct store *store, struct write *write, struct
     if (engine->undoes_one) TRY(engine->mark(db, err));
     write->code = write->run(store, db, write->operation, &write->err);
     const bool kept = write->code == ISCHIA_OK;
+    store->audit_head.known &= kept; /* it may have been moved by what is undone */
     if (engine->undoes_one && engine->is_in_transaction(db)) return engine->keep(db, !kept, err);
     if (!kept && err != NULL) *err = write->err;
     return write->code;
@@ -44,6 +45,7 @@ static enum ischia_code run_batch(struct store *store, struct write *first, stru
                                   struct ischia_error *err)
 {
     enum ischia_code code = ISCHIA_OK;
+    store->audit_head.known = false;
     for (struct write *w = first; w != end && code == ISCHIA_OK; w = w->next)
         code = run_one(store, w, err);
     if (code == ISCHIA_OK) code = store->engine->commit(store->writer, err);

@@ -128,9 +128,8 @@ class Answer:
 
 def admin(state, *words, check=True):
     """Runs an administration command; returns its standard output."""
-    done = subprocess.run(
-        [PROGRAM, '--state-dir', state, *store_options(state), *words], capture_output=True, text=True, timeout=PATIENCE_S
-    )
+    command = [PROGRAM, '--state-dir', state, *store_options(state), *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
     if check and done.returncode != 0:
         raise AssertionError(f'{words}: {done.returncode}: {done.stderr}')
     return done.stdout if check else done
