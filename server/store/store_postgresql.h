@@ -23,6 +23,7 @@ struct pg_place {
     char *location; /* postgresql://... */
     enum store_mode mode;
     atomic_llong daemon; /* this daemon's number in the table of the living; 0: none */
+    atomic_bool is_down; /* the last beat did not arrive: others need not wait to see it */
     char version[48];    /* "PostgreSQL 15.4" */
     struct fleet *fleet; /* NULL: a short-lived command */
 };

@@ -198,6 +198,8 @@ static enum ischia_code introduce(struct pg_db *own, struct ischia_error *err)
 enum ischia_code pg_ensure(struct db *db, bool *ret_fresh, struct ischia_error *err)
 {
     struct pg_db *own = own_of(db);
+    CHECK(own->role == PG_BEAT || !atomic_load(&own->place->is_down), err, ISCHIA_E_IO,
+          "the store cannot reach its database: the server does not answer");
     if (pg_is_lost(db)) TRY(connect_again(own, err));
     enum ischia_code code = introduce(own, err);
     if (code != ISCHIA_OK && pg_is_lost(db)) { /* it was, and nobody had noticed */

@@ -397,7 +397,9 @@ static void *fleet_main(void *argument)
     (void)sigfillset(&all);
     (void)pthread_sigmask(SIG_BLOCK, &all, NULL);
     while (!atomic_load(&fleet->stopping)) {
-        if (live(fleet, NULL) != ISCHIA_OK) fleet->beaten_since_ms = 0;
+        const bool lives = live(fleet, NULL) == ISCHIA_OK;
+        if (!lives) fleet->beaten_since_ms = 0;
+        atomic_store(&fleet->place->is_down, !lives && pg_is_lost(fleet->db));
         rest(fleet);
     }
     return NULL;
