@@ -31,6 +31,7 @@
  */
 
 enum { EXIT_USAGE = 2, TICK_MS = 1000, RETIRE_EVERY_S = 60, RETIRE_BATCH = 200 };
+enum { DATABASE_PATIENCE_S = 60 };
 enum { SWEEP_AGE_MS = 5 * 60 * 1000 };
 
 struct daemon {
@@ -234,6 +235,26 @@ static void find_worker(struct daemon *d)
     }
 }
 
+/* A database server may come up after us, after a power cut say. SIGTERM and SIGINT, which are
+ * blocked, end the wait; run is not reached then. */
+static enum ischia_code open_patiently(const struct store_options *options, struct store **ret,
+                                       struct ischia_error *err)
+{
+    const struct timespec pause = {.tv_sec = 1};
+    const int patience_s = store_is_on_server(options->location) ? DATABASE_PATIENCE_S : 0;
+    sigset_t ends;
+    struct log_value detail;
+    (void)sigemptyset(&ends);
+    (void)sigaddset(&ends, SIGTERM);
+    (void)sigaddset(&ends, SIGINT);
+    for (int waited_s = 0;; waited_s++) {
+        const enum ischia_code code = store_open(options, ret, err);
+        if (code != ISCHIA_E_IO || waited_s >= patience_s) return code;
+        LOG_WARNING("waiting for the database", "detail=%s", log_quote(&detail, err->message));
+        if (sigtimedwait(&ends, NULL, &pause) > 0) return code;
+    }
+}
+
 static enum ischia_code open_store(struct daemon *d, struct ischia_error *err)
 {
     const struct config *config = &d->service.config;
@@ -242,7 +263,7 @@ static enum ischia_code open_store(struct daemon *d, struct ischia_error *err)
         .mode = STORE_SERVE,
         .idempotency_ms = (int64_t)config->idempotency_hours * 3600 * 1000,
     };
-    return store_open(&options, &d->service.store, err);
+    return open_patiently(&options, &d->service.store, err);
 }
 
 static enum ischia_code create_parts(struct daemon *d, struct ischia_error *err)

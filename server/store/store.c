@@ -160,7 +160,11 @@ void store_close(struct store *store)
 
 const char *store_engine(const struct store *store) { return store->engine->version(store); }
 
-bool store_is_shared(const struct store *store) { return store->engine->watch != NULL; }
+bool store_is_on_server(const char *location)
+{
+    const char *rest = NULL;
+    return find_engine(location, &rest)->watch != NULL;
+}
 
 int store_schema_version(void) { return store_migration_count; }
 

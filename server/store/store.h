@@ -509,8 +509,8 @@ ISCHIA_MUST_CHECK enum ischia_code store_restore(const char *location, const cha
 
 /* Name and version of the engine, for /version: "SQLite 3.40.1". Lives as long as the store. */
 const char *store_engine(const struct store *store);
-/* Whether other daemons may share it. */
-bool store_is_shared(const struct store *store);
+/* Whether a location is on a server: other daemons may share it, and it may be away for a while. */
+bool store_is_on_server(const char *location);
 
 /*
  * Copies everything from one store into another, of whichever kinds, which must be empty: in one

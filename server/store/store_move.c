@@ -141,7 +141,7 @@ static enum ischia_code move_run(struct store *store, struct db *db, void *opera
 static enum ischia_code check_alone(struct store *store, struct db *db, struct ischia_error *err)
 {
     int64_t others = 0;
-    if (!store_is_shared(store)) return ISCHIA_OK;
+    if (store->engine->watch == NULL) return ISCHIA_OK;
     TRY(db_number(db,
                   "SELECT count(*) FROM daemon WHERE id <> own_daemon() AND "
                   "beat_at > clock_timestamp() - interval '5 s'",

@@ -132,10 +132,14 @@ enum ischia_code pg_execute(struct db *db, const char *text, int64_t *ret, struc
     return collect(own, "be used", ret, NULL, err);
 }
 
+/* What the server remarks goes into its own log; ours is of one line an event. */
+static void ignore_notice(void *context, const PGresult *result) { (void)context, (void)result; }
+
 /* What a session of ours is. A transaction that hangs in the middle, because its daemon does, must
  * not hold up all the others. */
 static enum ischia_code set_up_session(struct pg_db *own, struct ischia_error *err)
 {
+    (void)PQsetNoticeReceiver(own->connection, ignore_notice, NULL);
     (void)PQsetErrorVerbosity(own->connection, PQERRORS_TERSE);
     TRY(pg_execute(&own->db,
                    "SET search_path = ischia; SET client_min_messages = warning;"

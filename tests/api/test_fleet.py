@@ -27,6 +27,18 @@ def workers_of(service):
     return set(found)
 
 
+class Start(unittest.TestCase):
+    def test_a_daemon_waits_for_its_database(self):
+        with Cluster() as server:
+            server.kill()
+            later = threading.Timer(2, server.start)
+            later.start()
+            with Service('--store', server.url) as service:
+                service.until_ready()
+                self.assertIn('waiting for the database', service.errors())
+            later.join()
+
+
 class Two(unittest.TestCase):
     @classmethod
     def setUpClass(cls):

@@ -508,6 +508,49 @@ static void test_writers_share_commits(void **state)
     assert_int_equal(stats.write_failures, 0);
 }
 
+static bool count_token(void *context, const struct store_token *token)
+{
+    assert_string_equal(token->name, "scanner");
+    ++*(int *)context;
+    return true;
+}
+
+static void test_tokens(void **state)
+{
+    struct room *room = *state;
+    struct ischia_error err;
+    enum store_answer answer;
+    int64_t before = -1, after = -1;
+    struct store_token token = {.id = "t1", .name = "scanner", .scopes = 3, .expires_ms = 99};
+    token.digest[31] = 9;
+    assert_int_equal(store_token_epoch(room->store, &before, &err), ISCHIA_OK);
+    assert_int_equal(store_token_add(room->store, &token, &answer, &err), ISCHIA_OK);
+    assert_int_equal(answer, STORE_DONE);
+    assert_int_equal(store_token_add(room->store, &token, &answer, &err), ISCHIA_OK);
+    assert_int_equal(answer, STORE_CONFLICT);
+    assert_int_equal(store_token_epoch(room->store, &after, &err), ISCHIA_OK);
+    assert_int_equal(after, before + 1);
+    struct store_token got;
+    assert_int_equal(store_token_get(room->store, "t1", &got, &answer, &err), ISCHIA_OK);
+    assert_int_equal(answer, STORE_DONE);
+    assert_int_equal(got.scopes, 3);
+    assert_int_equal(got.expires_ms, 99);
+    assert_int_equal(got.created_ms, clock_ms);
+    assert_int_equal(got.revoked_ms, 0);
+    assert_int_equal(got.digest[31], 9);
+    assert_int_equal(store_token_revoke(room->store, "t1", &answer, &err), ISCHIA_OK);
+    assert_int_equal(answer, STORE_DONE);
+    assert_int_equal(store_token_revoke(room->store, "t1", &answer, &err), ISCHIA_OK);
+    assert_int_equal(answer, STORE_CONFLICT);
+    assert_int_equal(store_token_revoke(room->store, "t2", &answer, &err), ISCHIA_OK);
+    assert_int_equal(answer, STORE_NOT_FOUND);
+    assert_int_equal(store_token_get(room->store, "t1", &got, &answer, &err), ISCHIA_OK);
+    assert_int_equal(got.revoked_ms, clock_ms);
+    int count = 0;
+    assert_int_equal(store_token_list(room->store, count_token, &count, &err), ISCHIA_OK);
+    assert_int_equal(count, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -528,6 +571,7 @@ int main(void)
         STORE_TEST(test_retention),
         STORE_TEST(test_stats_count_states),
         STORE_TEST(test_writers_share_commits),
+        STORE_TEST(test_tokens),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
