@@ -25,16 +25,16 @@ FIGURES = {
     "solve_s": (5.0, "CPU s", "one standard solve; README, `ischia solve examples/table2_1R.json`"),
     "solve_spread": (0.35, "", "standard deviation over mean of solves; the sides of Table 2"),
     "commit_ms": (2.0, "ms", "one group commit of the database with its disk; assumed, `pg_test_fsync` measures it"),
-    "group": (32, "", "transactions that share a commit at most; with the two times that is 4 700 a second, "
-                      "and `bench_service.py` measured 4 660"),
-    "transaction_ms": (0.15, "ms", "work of the database for a transaction; from the same measurement"),
+    "group": (64, "", "transactions of one machine that share a commit at most; server/store/store_postgresql.c"),
+    "transaction_ms": (0.6, "ms", "work of the database for a transaction while the others wait; 810 assessments a second, "
+                                  "each with its audit row, by `bench_fleet.py`"),
     "transactions": (4, "", "of an assessment: accepted, claimed, stored, audited"),
     "reads": (20, "", "requests that read an assessment, its events and pages; assumed"),
     "read_ms": (0.02, "ms", "a read by the daemon; 57 000 a second by `bench_service.py`"),
     "store_kB": (25, "kB", "an assessment in the store, its field included; 12 sides of Table 2"),
     "cores": (16, "", "cores of a machine, one left for the daemon"),
     "wait_s": (10, "s", "longest wait that a clinic accepts for 19 in 20, before the solve itself"),
-    "lease_s": (15, "s", "after which the solves of a machine that died are somebody else's"),
+    "lease_s": (7, "s", "after which the solves of a machine that died are somebody else's; 5.1 s to 6.9 s by `cut_network.py`"),
     "core_hour": (0.04, "EUR", "a core for an hour, rented; assumed"),
     "GB_month": (0.12, "EUR", "a GB of the store for a month, with its copies; assumed"),
 }
@@ -265,8 +265,9 @@ def page(figures):
     """CAPACITY.md with its tables made anew; what stands between them is left alone."""
     broke, at = break_table(figures)
     limit = database_limit(figures)
-    sentence = [f"With these figures the database is full at about {limit:.0f} assessments a second "
-                f"({limit * figures['solve_s']:.0f} cores that solve); the simulation stopped at {at:g}."]
+    sentence = [f"With these figures the turn to write is never free at {at:g} assessments a second "
+                f"({at * figures['solve_s']:.0f} cores that solve), where the simulation stopped; with every "
+                f"group full the database would end at about {limit:.0f}."]
     tables = {"figures": figures_table(figures), "places": places_table(figures),
               "break": broke + [""] + sentence, "solves": solve_table(figures)}
     text = PAGE.read_text(encoding="utf-8")

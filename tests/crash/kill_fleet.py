@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """kill -9 of daemons, of their workers and of the database server at random moments, while clients
-use three daemons on one store: kill_fleet.py MOMENTS [SEED], the daemon in $ISCHIAD.
+use three daemons on one store: kill_fleet.py MOMENTS [SEED], the daemon in $ISCHIAD. Now and then a
+daemon is frozen instead, for less or longer than its lease, and goes on as if nothing had happened.
 
 Defends I1 to I4, I6, I13, I18, I20 and I21 of docs/INVARIANTS.md. Clients submit, wait, cancel,
 erase, ask for studies and follow the changes at any of the daemons; what one has answered is a
@@ -9,8 +10,8 @@ promise of all. What was cut off, or answered 503, is asked again with the same 
 another daemon as often as not. A promise that is not kept is a FAULT; so is any answer that a client
 could not expect, a 404 for what it has just been given above all.
 """
-import os
 import random
+import signal
 import sys
 import threading
 import time
@@ -22,7 +23,8 @@ from kill_service import (CANCEL_EVERY, ERASE_EVERY, FINAL, WAIT_EVERY, CutOff, 
 from service import admin, side
 
 DAEMONS, CLIENTS, POINTS, STUDY_EVERY = 3, 6, 4, 40
-PLACES = ('daemon', 'daemon', 'daemon', 'worker', 'worker', 'worker', 'database')
+PLACES = ('daemon', 'daemon', 'daemon', 'worker', 'worker', 'worker', 'database', 'freeze')
+LEASE_S = 5
 
 
 class Unanswered(Exception):
@@ -163,6 +165,10 @@ def wreck(fleet, server, world):
         server.kill()
         time.sleep(random.uniform(0, 0.5))
         server.start()
+    elif place == 'freeze':
+        fleet.daemons[i].signal(signal.SIGSTOP)
+        time.sleep(random.uniform(0, 2 * LEASE_S))
+        fleet.daemons[i].signal(signal.SIGCONT)
     elif place == 'worker':
         kill_one_worker(fleet.daemons[i].process.pid)
     else:
