@@ -169,8 +169,12 @@ void query_put_blob(struct query *query, const void *bytes, size_t size);
 ISCHIA_MUST_CHECK enum ischia_code query_step(struct query *query, bool *ret_row,
                                               struct ischia_error *err);
 void query_end(struct query *query);
-/* Steps a statement whose rows, if it has any, are of no interest, and ends it. */
+/* Runs a statement whose rows, if it has any, are of no interest, and ends it. In a transaction its
+ * failure may show at a later statement, or at the commit. */
 ISCHIA_MUST_CHECK enum ischia_code query_run(struct query *query, struct ischia_error *err);
+/* The same, at once; *ret: how many rows it has changed. */
+ISCHIA_MUST_CHECK enum ischia_code query_change(struct query *query, int64_t *ret,
+                                                struct ischia_error *err);
 /* Runs a statement without parameters. */
 ISCHIA_MUST_CHECK enum ischia_code db_run(struct db *db, enum sql sql, struct ischia_error *err);
 /* Steps once, ends, and returns the first column as a number; `otherwise` when there is no row. */
@@ -224,6 +228,8 @@ struct engine {
     bool (*is_lost)(const struct db *db); /* the connection: trying at once again is in vain */
 
     enum ischia_code (*step)(struct query *query, bool *ret_row, struct ischia_error *err);
+    /* query_run without the end; NULL: a step does it */
+    enum ischia_code (*run)(struct query *query, struct ischia_error *err);
     void (*end)(struct query *query);
     /* Columns of the present row. *ret_size without the NUL that ends a text. NULL: it is NULL, or,
      * when *ret_size is not 0, there was no memory. */

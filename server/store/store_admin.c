@@ -25,8 +25,9 @@ static enum ischia_code token_add_run(struct store *store, struct db *db, void *
     query_put_integer(&query, add->token.scopes);
     query_put_integer(&query, store_now_ms(store));
     query_put_integer(&query, add->token.expires_ms);
-    TRY(query_run(&query, err));
-    add->answer = db->engine->changed(db) == 1 ? STORE_DONE : STORE_CONFLICT;
+    int64_t added = 0;
+    TRY(query_change(&query, &added, err));
+    add->answer = added == 1 ? STORE_DONE : STORE_CONFLICT;
     return ISCHIA_OK;
 }
 

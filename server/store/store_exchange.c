@@ -173,8 +173,9 @@ static enum ischia_code revive_run(struct store *store, struct db *db, void *ope
     struct query query;
     query_begin(&query, db, SQL_OUTBOX_REVIVE);
     query_put_integer(&query, store_now_ms(store));
-    TRY(query_run(&query, err));
-    *(int *)operation = (int)db->engine->changed(db);
+    int64_t revived = 0;
+    TRY(query_change(&query, &revived, err));
+    *(int *)operation = (int)revived;
     return ISCHIA_OK;
 }
 

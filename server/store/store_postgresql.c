@@ -188,6 +188,7 @@ const struct engine engine_postgresql = {
     .is_in_transaction = pg_is_in_transaction,
     .is_lost = pg_is_lost,
     .step = pg_step,
+    .run = pg_run,
     .end = pg_end,
     .integer = pg_integer,
     .bytes = pg_bytes,

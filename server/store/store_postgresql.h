@@ -55,6 +55,7 @@ void pg_roll_back(struct db *db);
 bool pg_is_in_transaction(const struct db *db);
 bool pg_is_lost(const struct db *db);
 enum ischia_code pg_step(struct query *query, bool *ret_row, struct ischia_error *err);
+enum ischia_code pg_run(struct query *query, struct ischia_error *err);
 void pg_end(struct query *query);
 int64_t pg_integer(struct query *query, int column);
 const void *pg_bytes(struct query *query, int column, size_t *ret_size);

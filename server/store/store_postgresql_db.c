@@ -16,6 +16,7 @@
 
 #include "server/store/store_postgresql.h"
 
+enum { OWED_MAX = 256 }; /* their answers fit into any socket's buffer */
 enum { ANSWER_MS = 20000, BEAT_ANSWER_MS = 3000, AGAIN_MS = 500, TEXT_MAX = 4096 };
 
 /* Writers queue here; any number of ours will do. The same in the documentation. */
@@ -28,11 +29,13 @@ struct pg_db {
     PGconn *connection; /* NULL: lost */
     bool fresh;
     bool prepared[SQL_COUNT];
-    bool streaming;          /* rows of the present query are still to come */
-    bool in_transaction;     /* begun and not ended, whatever became of the connection */
-    int64_t daemon;          /* as the session knows it */
-    int64_t changed;         /* rows, by the last statement */
-    int64_t again_at_ms;     /* no attempt to connect before; monotonic */
+    bool streaming;      /* rows of the present query are still to come */
+    bool in_transaction; /* begun and not ended, whatever became of the connection */
+    int owed;            /* statements sent whose answers have not been taken: then it is in libpq's
+                 pipeline mode, else not */
+    int64_t daemon;      /* as the session knows it */
+    int64_t changed;     /* rows, by the last statement */
+    int64_t again_at_ms; /* no attempt to connect before; monotonic */
     struct ischia_error why; /* it could not be made */
 };
 
@@ -55,6 +58,7 @@ static void drop(struct pg_db *own)
     PQfinish(own->connection);
     own->connection = NULL;
     own->streaming = false;
+    own->owed = 0;
     memset(own->prepared, 0, sizeof own->prepared);
 }
 
@@ -130,6 +134,53 @@ enum ischia_code pg_execute(struct db *db, const char *text, int64_t *ret, struc
     if (own->connection == NULL || PQsendQuery(own->connection, text) == 0)
         return fail(own, NULL, "be used", err);
     return collect(own, "be used", ret, NULL, err);
+}
+
+/* Takes the answers that are owed, after all of them were asked for. Statements behind one that
+ * failed are not carried out. */
+static enum ischia_code take_owed(struct pg_db *own, struct ischia_error *err)
+{
+    enum ischia_code code = ISCHIA_OK;
+    const int owed = own->owed;
+    bool silent = false;
+    own->owed = 0;
+    for (int i = 0; i < owed && !silent; i++) {
+        PGresult *result = next_result(own, &silent);
+        if (code == ISCHIA_OK && !is_good(result)) code = fail(own, result, "be used", err);
+        PQclear(result);
+        if (!silent) PQclear(next_result(own, &silent)); /* NULL: the end of this one */
+    }
+    return code;
+}
+
+/* Takes the mark behind the last answer. A connection on which it does not come is of no use. */
+static enum ischia_code leave_pipeline(struct pg_db *own, enum ischia_code code,
+                                       struct ischia_error *err)
+{
+    bool silent = false;
+    PGresult *mark = next_result(own, &silent);
+    const bool good =
+        PQresultStatus(mark) == PGRES_PIPELINE_SYNC && PQexitPipelineMode(own->connection) != 0;
+    PQclear(mark);
+    if (!good && code == ISCHIA_OK) code = fail(own, NULL, "be used", err);
+    if (!good) drop(own);
+    return code;
+}
+
+static enum ischia_code ask_for_owed(struct pg_db *own, struct ischia_error *err)
+{
+    if (PQpipelineSync(own->connection) != 0) return ISCHIA_OK;
+    const enum ischia_code code = fail(own, NULL, "be used", err);
+    drop(own);
+    return code;
+}
+
+static enum ischia_code settle(struct pg_db *own, struct ischia_error *err)
+{
+    if (own->owed == 0) return ISCHIA_OK;
+    TRY(ask_for_owed(own, err));
+    const enum ischia_code code = take_owed(own, err);
+    return leave_pipeline(own, code, err);
 }
 
 /* What the server remarks goes into its own log; ours is of one line an event. */
@@ -277,6 +328,7 @@ enum ischia_code pg_commit(struct db *db, struct ischia_error *err)
 {
     struct pg_db *own = own_of(db);
     char tag[16] = "";
+    TRY(settle(own, err));
     if (own->connection == NULL || PQtransactionStatus(own->connection) != PQTRANS_INTRANS ||
         PQsendQuery(own->connection, "COMMIT") == 0)
         return fail(own, NULL, "commit", err);
@@ -292,6 +344,7 @@ void pg_roll_back(struct db *db)
     struct pg_db *own = own_of(db);
     const bool begun = own->in_transaction;
     own->in_transaction = false;
+    if (begun) (void)!settle(own, NULL);
     if (pg_is_lost(db) || !begun) return;
     if (pg_execute(db, "ROLLBACK", NULL, NULL) != ISCHIA_OK) drop(own);
 }
@@ -395,11 +448,35 @@ static enum ischia_code take_result(struct pg_db *own, struct query *query,
     return collect(own, "be used", NULL, NULL, err); /* the end of it */
 }
 
+/* The answer to a statement that was sent behind others whose answers are owed. */
+static enum ischia_code take_behind(struct pg_db *own, struct query *query,
+                                    struct ischia_error *err)
+{
+    bool silent = false;
+    TRY(ask_for_owed(own, err));
+    enum ischia_code code = take_owed(own, err);
+    query->row = -1;
+    query->state = next_result(own, &silent);
+    if (code == ISCHIA_OK && !is_good(query->state)) code = fail(own, query->state, "be used", err);
+    if (code == ISCHIA_OK) own->changed = strtoll(PQcmdTuples(query->state), NULL, 10);
+    if (!silent) PQclear(next_result(own, &silent)); /* NULL: the end of it */
+    return leave_pipeline(own, code, err);
+}
+
+/* Whether a statement can be sent behind others at once. */
+static bool fits_behind(const struct pg_db *own, const struct query *query)
+{
+    const bool known = query->sql == SQL_COUNT || own->prepared[query->sql];
+    return known && !query->rows_stream && own->owed < OWED_MAX;
+}
+
 static enum ischia_code start_once(struct pg_db *own, struct query *query, struct ischia_error *err)
 {
     assert(!own->streaming);
     query->begun = true;
+    if (!fits_behind(own, query)) TRY(settle(own, err));
     TRY(send_query(own, query, err));
+    if (own->owed > 0) return take_behind(own, query, err);
     if (query->rows_stream && PQsetSingleRowMode(own->connection) != 0) own->streaming = true;
     return take_result(own, query, err);
 }
@@ -425,6 +502,26 @@ enum ischia_code pg_step(struct query *query, bool *ret_row, struct ischia_error
     if (query->row < PQntuples(query->state)) query->row++;
     *ret_row = query->row < PQntuples(query->state);
     return ISCHIA_OK;
+}
+
+/* In a transaction nobody waits for what is of no interest: the answer is taken with that to a
+ * later statement, or before the commit. A study has thousands of points, and the others wait
+ * meanwhile. */
+enum ischia_code pg_run(struct query *query, struct ischia_error *err)
+{
+    struct pg_db *own = own_of(query->db);
+    bool row;
+    if (!own->in_transaction || own->connection == NULL) return pg_step(query, &row, err);
+    if (!fits_behind(own, query)) TRY(settle(own, err));
+    if (query->sql != SQL_COUNT) TRY(prepare(own, query->sql, err));
+    if (own->owed == 0 && (own->connection == NULL || PQenterPipelineMode(own->connection) == 0))
+        return fail(own, NULL, "be used", err);
+    const enum ischia_code code = send_query(own, query, err);
+    if (code == ISCHIA_OK)
+        own->owed++;
+    else
+        drop(own);
+    return code;
 }
 
 /* A stream that is left in the middle: the server need not send the rest. */

@@ -393,14 +393,16 @@ static void rest(struct fleet *fleet)
 static void *fleet_main(void *argument)
 {
     struct fleet *fleet = argument;
+    int failures = 0; /* in a row */
     sigset_t all; /* signals are the main thread's */
     (void)sigfillset(&all);
     (void)pthread_sigmask(SIG_BLOCK, &all, NULL);
     while (!atomic_load(&fleet->stopping)) {
-        const bool lives = live(fleet, NULL) == ISCHIA_OK;
-        if (!lives) fleet->beaten_since_ms = 0;
-        atomic_store(&fleet->place->is_down, !lives && pg_is_lost(fleet->db));
-        rest(fleet);
+        failures = live(fleet, NULL) == ISCHIA_OK ? 0 : failures + 1;
+        if (failures > 0) fleet->beaten_since_ms = 0;
+        /* one may be a connection that was lost: it comes back with the next attempt, or not */
+        atomic_store(&fleet->place->is_down, failures > 1 && pg_is_lost(fleet->db));
+        if (failures != 1) rest(fleet);
     }
     return NULL;
 }

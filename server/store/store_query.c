@@ -57,7 +57,18 @@ void query_end(struct query *query)
 enum ischia_code query_run(struct query *query, struct ischia_error *err)
 {
     bool row;
+    const struct engine *engine = query->db->engine;
+    const enum ischia_code code =
+        engine->run != NULL ? engine->run(query, err) : query_step(query, &row, err);
+    query_end(query);
+    return code;
+}
+
+enum ischia_code query_change(struct query *query, int64_t *ret, struct ischia_error *err)
+{
+    bool row;
     const enum ischia_code code = query_step(query, &row, err);
+    if (code == ISCHIA_OK) *ret = query->db->engine->changed(query->db);
     query_end(query);
     return code;
 }
