@@ -26,15 +26,16 @@ FIGURES = {
     "solve_spread": (0.35, "", "standard deviation over mean of solves; the sides of Table 2"),
     "commit_ms": (2.0, "ms", "one group commit of the database with its disk; assumed, `pg_test_fsync` measures it"),
     "group": (64, "", "transactions of one machine that share a commit at most; server/store/store_postgresql.c"),
-    "transaction_ms": (0.6, "ms", "work of the database for a transaction while the others wait; 810 assessments a second, "
-                                  "each with its audit row, by `bench_fleet.py`"),
+    "transaction_ms": (0.6, "ms", "work of the database for a transaction while the others wait; 810 assessments a "
+                                  "second, each with its audit row, by `bench_fleet.py`"),
     "transactions": (4, "", "of an assessment: accepted, claimed, stored, audited"),
     "reads": (20, "", "requests that read an assessment, its events and pages; assumed"),
     "read_ms": (0.02, "ms", "a read by the daemon; 57 000 a second by `bench_service.py`"),
     "store_kB": (25, "kB", "an assessment in the store, its field included; 12 sides of Table 2"),
     "cores": (16, "", "cores of a machine, one left for the daemon"),
     "wait_s": (10, "s", "longest wait that a clinic accepts for 19 in 20, before the solve itself"),
-    "lease_s": (7, "s", "after which the solves of a machine that died are somebody else's; 5.1 s to 6.9 s by `cut_network.py`"),
+    "lease_s": (7, "s", "after which the solves of a machine that died are somebody else's; 5.1 s to 6.9 s by "
+                        "`cut_network.py`"),
     "core_hour": (0.04, "EUR", "a core for an hour, rented; assumed"),
     "GB_month": (0.12, "EUR", "a GB of the store for a month, with its copies; assumed"),
 }

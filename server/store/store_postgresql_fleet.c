@@ -394,7 +394,7 @@ static void *fleet_main(void *argument)
 {
     struct fleet *fleet = argument;
     int failures = 0; /* in a row */
-    sigset_t all; /* signals are the main thread's */
+    sigset_t all;     /* signals are the main thread's */
     (void)sigfillset(&all);
     (void)pthread_sigmask(SIG_BLOCK, &all, NULL);
     while (!atomic_load(&fleet->stopping)) {
