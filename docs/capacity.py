@@ -26,7 +26,7 @@ FIGURES = {
     "solve_spread": (0.35, "", "standard deviation over mean of solves; the sides of Table 2"),
     "commit_ms": (2.0, "ms", "one group commit of the database with its disk; assumed, `pg_test_fsync` measures it"),
     "group": (64, "", "transactions of one machine that share a commit at most; server/store/store_postgresql.c"),
-    "transaction_ms": (0.6, "ms", "work of the database for a transaction while the others wait; 810 assessments a "
+    "transaction_ms": (0.5, "ms", "work of the database for a transaction while the others wait; 1 000 assessments a "
                                   "second, each with its audit row, by `bench_fleet.py`"),
     "transactions": (4, "", "of an assessment: accepted, claimed, stored, audited"),
     "reads": (20, "", "requests that read an assessment, its events and pages; assumed"),
