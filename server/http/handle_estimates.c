@@ -37,21 +37,14 @@ enum { SHOWN_COUNT = sizeof shown / sizeof shown[0] };
 
 /* -------------------------------------------------------------------------------- values */
 
-static const struct predictor_output *output_for(const struct predictor *p, const char *response)
-{
-    for (int o = 0; o < p->output_count; o++)
-        if (strcmp(p->output[o].name, response) == 0) return &p->output[o];
-    return NULL;
-}
-
 static double at_most(double value, double ceiling) { return value < ceiling ? value : ceiling; }
 
 static void write_value(struct json_out *out, const struct shown *s, const struct predictor *p,
                         const struct predictor_point *point, double F_N)
 {
-    const struct predictor_output *output = output_for(p, s->response);
+    const struct predictor_output *output = predictor_output_named(p, s->response);
     struct predictor_estimate e = {0};
-    if (output != NULL) e = predictor_estimate_of(output, point);
+    if (output != NULL) e = predictor_estimate_of(p, output, point);
     if (output == NULL || (s->crossing && e.value > F_N)) {
         json_put_null(out, s->key);
         return;
@@ -128,13 +121,6 @@ static void write_warnings(struct json_out *out, const struct predictor *p,
 
 /* ------------------------------------------------------------------------------ the whole */
 
-static bool covers_all(const struct predictor *p, const struct ischia_case *c)
-{
-    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
-        if (!predictor_covers(p, c, (enum ischia_param)i)) return false;
-    return predictor_same_options(p, c);
-}
-
 static void write_emulator(struct json_out *out, const struct estimator *estimator)
 {
     const struct predictor *p = &estimator->predictor;
@@ -150,7 +136,7 @@ static void send_estimate(struct call *call, const struct ischia_case *c, struct
 {
     const struct estimator *estimator = call->service->estimator;
     const struct predictor *p = &estimator->predictor;
-    const bool known = covers_all(p, c);
+    const bool known = predictor_knows(p, c);
     struct predictor_point point;
     struct json_out out;
     struct ischia_error err;
@@ -184,7 +170,7 @@ void handle_estimate(struct call *call, struct http_response *ret)
     if (call->service->estimator == NULL) {
         reply_refusal_english(
             http, ret, PROBLEM_NOT_FOUND,
-            "No trained emulator is installed here (option emulator), so there are no "
+            "No trained emulator is in use here (option emulator), so there are no "
             "estimates; an assessment is always solved.");
         return;
     }
