@@ -91,10 +91,10 @@ class Estimates(unittest.TestCase):
 
 class Installing(unittest.TestCase):
     def test_without_one_there_are_none(self):
-        with Service() as service:
+        with Service('--emulator', 'none') as service:
             answer = service.ask('POST', '/v1/estimates', INSIDE)
             self.assertEqual(answer.status, 404)
-            self.assertIn('No trained emulator is installed', answer.json()['detail'])
+            self.assertIn('No trained emulator is in use', answer.json()['detail'])
 
     def test_a_damaged_one_is_refused_at_start(self):
         with tempfile.TemporaryDirectory() as folder:
