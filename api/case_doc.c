@@ -286,7 +286,7 @@ void case_doc_write_options(struct json_out *out, const struct ischia_request *r
 }
 
 /* Of an object every input, so that what is kept can be read without knowing what 0 means. */
-static void write_sd(struct json_out *out, const struct ischia_request *request)
+void case_doc_write_sd(struct json_out *out, const struct ischia_request *request)
 {
     if (!request->has_sd) return;
     if (request->sd_typical) {
@@ -312,6 +312,6 @@ void case_doc_write(struct json_out *out, const struct ischia_request *request)
     case_doc_write_parameters(out, &request->values);
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         if (texts[i].value[0] != '\0') json_put_string(out, texts[i].key, texts[i].value);
-    write_sd(out, request);
+    case_doc_write_sd(out, request);
     case_doc_write_options(out, request);
 }

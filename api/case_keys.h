@@ -6,8 +6,8 @@
 
 /* What the readers of a case share: the keys and what is done with each. For api/case_*.c only. */
 
-/* Keys 0 ... ISCHIA_PARAM_COUNT - 1 are the seven inputs, then these, then one for each option, then
- * one for the standard deviation of each input. */
+/* Keys 0 ... ISCHIA_PARAM_COUNT - 1 are the seven inputs, then these, then one for each option,
+ * then one for the standard deviation of each input. */
 enum case_key {
     KEY_SUBJECT = ISCHIA_PARAM_COUNT,
     KEY_SIDE,

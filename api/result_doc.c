@@ -270,10 +270,9 @@ void result_doc_write(struct json_out *out, const struct ischia_case *c,
     fields_write(out, result_fields, &view);
 }
 
-enum ischia_code result_doc_text(char **ret_text, const struct ischia_case *c,
-                                 const struct ischia_result *result,
-                                 const struct ischia_uncertainty *uncertainty, int indent,
-                                 struct ischia_error *err)
+enum ischia_code
+result_doc_text(char **ret_text, const struct ischia_case *c, const struct ischia_result *result,
+                const struct ischia_uncertainty *uncertainty, int indent, struct ischia_error *err)
 {
     struct json_out out;
     CHECK(is_presentable(result), err, ISCHIA_E_NUMERIC,

@@ -29,10 +29,9 @@ void result_doc_write(struct json_out *out, const struct ischia_case *c,
 
 /* The whole object as one text (indent as json_out), the caller's to free. uncertainty: NULL when
  * the inputs were taken as exact; else its member (uncertainty_doc.h) comes last. */
-ISCHIA_MUST_CHECK enum ischia_code result_doc_text(char **ret_text, const struct ischia_case *c,
-                                                   const struct ischia_result *result,
-                                                   const struct ischia_uncertainty *uncertainty,
-                                                   int indent, struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code
+result_doc_text(char **ret_text, const struct ischia_case *c, const struct ischia_result *result,
+                const struct ischia_uncertainty *uncertainty, int indent, struct ischia_error *err);
 
 /*
  * Reads what result_doc_write wrote, bit for bit; keys it does not know are ignored. Errors as

@@ -29,10 +29,9 @@ static enum ischia_code print_json(const struct ischia_case *c,
     return ISCHIA_OK;
 }
 
-static enum ischia_code print_result(const struct solve_options *options,
-                                     const struct ischia_request *request,
-                                     const struct uncertain_solution *solved,
-                                     struct ischia_error *err)
+static enum ischia_code
+print_result(const struct solve_options *options, const struct ischia_request *request,
+             const struct uncertain_solution *solved, struct ischia_error *err)
 {
     if (!options->summary) return print_json(&request->values, solved, err);
     summary_print(stdout, request, &solved->result, uncertain_of(solved));
@@ -53,8 +52,8 @@ static enum ischia_code write_fields(const struct solve_options *options,
 /* The emulator that was named, else the one that came with the program, if there is one. It is
  * only read when the inputs are uncertain. */
 static enum ischia_code load_emulator(const struct solve_options *options,
-                                      const struct ischia_request *request,
-                                      struct estimator **ret, struct ischia_error *err)
+                                      const struct ischia_request *request, struct estimator **ret,
+                                      struct ischia_error *err)
 {
     char path[ESTIMATOR_PATH_BYTES];
     if (!request->has_sd) return ISCHIA_OK;
@@ -113,7 +112,8 @@ int command_solve(int argc, char **argv)
         .synopsis = "[FILE|-]",
         .about = "Solves one side. FILE is a JSON object with R1, R2, eM, eF, muM, muF and F\n"
                  "(standard input when it is - or left out). The result object goes to standard\n"
-                 "output; a result that did not converge has null for what is not known. With \"sd\" (an\n"
+                 "output; a result that did not converge has null for what is not known. With "
+                 "\"sd\" (an\n"
                  "object of standard deviations, or \"typical\") it says how uncertain it is.",
         .options = table,
         .operands_max = 1,

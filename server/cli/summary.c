@@ -123,7 +123,8 @@ static void print_uncertainty(FILE *out, const struct ischia_uncertainty *u)
     print_interval(out, "(median and", "shear", " mm³", 0, u->quantile[UNCERTAIN_VOLUME_SHEAR]);
     print_interval(out, "5 to 95 %)", "compression", " mm³", 0,
                    u->quantile[UNCERTAIN_VOLUME_COMPRESSION]);
-    (void)fprintf(out, "            samples over the threshold: shear %.0f %%, compression %.0f %%\n",
+    (void)fprintf(out,
+                  "            samples over the threshold: shear %.0f %%, compression %.0f %%\n",
                   100 * u->share_shear, 100 * u->share_compression);
     print_sources(out, u);
     (void)fprintf(out, "            beside it: error of the model's form, %.3f in eps_max\n",

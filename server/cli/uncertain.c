@@ -39,11 +39,10 @@ static enum ischia_code solve_checks(struct ischia_solver *solver, const struct 
     return ISCHIA_OK;
 }
 
-static enum ischia_code add_uncertainty(struct ischia_solver *solver,
-                                        const struct estimator *estimator,
-                                        const struct ischia_request *request, struct stage *stage,
-                                        struct uncertain_solution *solution,
-                                        struct ischia_error *err)
+static enum ischia_code
+add_uncertainty(struct ischia_solver *solver, const struct estimator *estimator,
+                const struct ischia_request *request, struct stage *stage,
+                struct uncertain_solution *solution, struct ischia_error *err)
 {
     double sd[ISCHIA_PARAM_COUNT];
     struct ischia_uncertainty *u = &solution->uncertainty;

@@ -22,11 +22,9 @@ const struct ischia_uncertainty *uncertain_of(const struct uncertain_solution *s
 
 /* estimator: NULL when no emulator is there. Progress runs over all solves. Errors as ischia_solve;
  * *ret is untouched then. */
-ISCHIA_MUST_CHECK enum ischia_code uncertain_solve(struct ischia_solver *solver,
-                                                   const struct estimator *estimator,
-                                                   const struct ischia_request *request,
-                                                   const struct ischia_observer *observer,
-                                                   struct uncertain_solution *ret,
-                                                   struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code
+uncertain_solve(struct ischia_solver *solver, const struct estimator *estimator,
+                const struct ischia_request *request, const struct ischia_observer *observer,
+                struct uncertain_solution *ret, struct ischia_error *err);
 
 #endif

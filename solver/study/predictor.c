@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * root(z) = sum of theta P_a(z_1) ... P_g(z_7) + sum of w_j (1 + r_j^2 / 4)^-2,
- * r_j^2 = sum over i of ((z_i - c_ji) / l_i)^2, i over the inputs and the groups. The covariance is the rational quadratic one with
- * alpha 2 (Rasmussen and Williams 2006, 4.19), which costs a division and no exponential. Legendre
- * polynomials by their recurrence, (n + 1) P_{n+1} = (2n + 1) x P_n - n P_{n-1} (Abramowitz and
- * Stegun 22.7.10). An estimate of one output takes some ten microseconds.
+ * root(z) = sum of theta P_a(z_1) ... P_g(z_7) + sum of w_j (1 + r_j^2 / 4)^-2, r_j^2 = sum over i
+ * of ((z_i - c_ji) / l_i)^2, i over the inputs and the groups. The covariance is the rational
+ * quadratic one with alpha 2 (Rasmussen and Williams 2006, 4.19), which costs a division and no
+ * exponential. Legendre polynomials by their recurrence, (n + 1) P_{n+1} = (2n + 1) x P_n - n
+ * P_{n-1} (Abramowitz and Stegun 22.7.10). An estimate of one output takes some ten microseconds.
  */
 #include "solver/study/predictor.h"
 

@@ -29,7 +29,7 @@ struct predictor_input {
     bool log;        /* scaled in the logarithm                          */
 };
 
-/* A product of powers of the inputs, such as F / (muM R1 R2): what acts together is near together. */
+/* A product of powers of the inputs, such as F / (muM R1 R2): what acts as one is near as one. */
 struct predictor_group {
     double power[ISCHIA_PARAM_COUNT];
     double low, high; /* of its logarithm; these become -1 and 1 */

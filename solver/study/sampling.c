@@ -24,7 +24,8 @@ static double between(double x, double low, double high) { return fmin(fmax(x, l
 static double standard_value(double a, double b, double u)
 {
     const double below = lower_tail(a);
-    return special_normal_quantile(between(below + u * (lower_tail(b) - below), 1e-300, 1 - 0x1p-53));
+    return special_normal_quantile(
+        between(below + u * (lower_tail(b) - below), 1e-300, 1 - 0x1p-53));
 }
 
 double sampling_truncated_normal(double mean, double sd, double low, double high,
@@ -66,8 +67,8 @@ struct ischia_case sampling_case(const struct ischia_case *measured,
 }
 
 const struct sampling_typical sampling_typical[ISCHIA_PARAM_COUNT] = {
-    [ISCHIA_R1] = {0.84, 0},  [ISCHIA_R2] = {10.6, 0},  [ISCHIA_EM] = {2, 0},
-    [ISCHIA_EF] = {3, 0},     [ISCHIA_MUM] = {0, 0.20}, [ISCHIA_MUF] = {0, 0.20},
+    [ISCHIA_R1] = {0.84, 0}, [ISCHIA_R2] = {10.6, 0},  [ISCHIA_EM] = {2, 0},
+    [ISCHIA_EF] = {3, 0},    [ISCHIA_MUM] = {0, 0.20}, [ISCHIA_MUF] = {0, 0.20},
     [ISCHIA_F] = {0, 0.10},
 };
 

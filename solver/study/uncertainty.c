@@ -124,7 +124,8 @@ static double tied_value(const struct tied *t, enum uncertain_quantity q,
 /* ----------------------------------------------------------------------------- samples */
 
 enum { COLUMNS = 2 * ISCHIA_PARAM_COUNT };
-_Static_assert((int)COLUMNS <= (int)SEQUENCE_DIMENSIONS_MAX, "a column of the sequence for each input, twice");
+_Static_assert((int)COLUMNS <= (int)SEQUENCE_DIMENSIONS_MAX,
+               "a column of the sequence for each input, twice");
 
 /* Sample `index` of set A; `from_b`: the input whose column is that of set B, COLUMNS: all are. */
 static struct ischia_case sample_case(const struct tied *t, uint64_t seed, uint32_t index,
@@ -242,8 +243,7 @@ static void fill_quantiles(struct samples *s, struct ischia_uncertainty *u)
         if (isnan(s->value[q][0])) continue;
         qsort(s->value[q], (size_t)s->inside, sizeof(double), compare);
         for (int k = 0; k < UNCERTAINTY_QUANTILES; k++)
-            u->quantile[q][k] =
-                quantile_of(s->value[q], s->inside, uncertainty_probabilities[k]);
+            u->quantile[q][k] = quantile_of(s->value[q], s->inside, uncertainty_probabilities[k]);
     }
     u->share_shear = s->shear / n;
     u->share_compression = s->compression / n;
@@ -354,8 +354,7 @@ static void fill_sensitivity(const struct tied *t, uint64_t seed, struct ischia_
         return;
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
         const bool varies = t->sd[i] > 0;
-        u->first_order[i] =
-            varies ? fmin(fmax(1 - sums.first[i] / (2 * n * variance), 0), 1) : 0;
+        u->first_order[i] = varies ? fmin(fmax(1 - sums.first[i] / (2 * n * variance), 0), 1) : 0;
         u->total[i] = fmin(sums.total[i] / (2 * n * variance), 1);
     }
 }
@@ -365,10 +364,8 @@ static void fill_sensitivity(const struct tied *t, uint64_t seed, struct ischia_
 static void blank(struct ischia_uncertainty *u, const double sd[ISCHIA_PARAM_COUNT])
 {
     const double none = (double)NAN;
-    *u = (struct ischia_uncertainty){.share_shear = none,
-                                     .share_compression = none,
-                                     .share_both = none,
-                                     .emulator_sd = none};
+    *u = (struct ischia_uncertainty){
+        .share_shear = none, .share_compression = none, .share_both = none, .emulator_sd = none};
     memcpy(u->sd, sd, sizeof u->sd);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) u->first_order[i] = u->total[i] = none;
     for (int q = 0; q < UNCERTAIN_COUNT; q++)
@@ -406,11 +403,10 @@ static void evaluate(const struct tied *t, uint64_t seed, struct samples *s,
     fill_quantiles(s, u);
 }
 
-enum ischia_code uncertainty_compute(struct ischia_uncertainty *ret,
-                                     const struct predictor *predictor, const struct ischia_case *c,
-                                     const double sd[ISCHIA_PARAM_COUNT],
-                                     const struct ischia_result *result, uint64_t seed,
-                                     struct ischia_error *err)
+enum ischia_code
+uncertainty_compute(struct ischia_uncertainty *ret, const struct predictor *predictor,
+                    const struct ischia_case *c, const double sd[ISCHIA_PARAM_COUNT],
+                    const struct ischia_result *result, uint64_t seed, struct ischia_error *err)
 {
     assert(ischia_result_converged(result) && sampling_sd_is_valid(sd));
     struct ischia_uncertainty u;
@@ -449,8 +445,8 @@ bool uncertainty_is_valid(const struct ischia_uncertainty *u)
                 is_share(u->share_shear) && is_share(u->share_compression) &&
                 is_share(u->share_both);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
-        good = good && is_share(u->first_order[i]) && is_share(u->total[i]) &&
-               is_share(u->outside[i]);
+        good =
+            good && is_share(u->first_order[i]) && is_share(u->total[i]) && is_share(u->outside[i]);
     for (int q = 0; q < UNCERTAIN_COUNT; q++) good = good && rises(u->quantile[q]);
     return good;
 }

@@ -47,7 +47,7 @@ enum uncertainty_status {
     UNCERTAINTY_GIVEN,
     UNCERTAINTY_NO_EMULATOR,
     UNCERTAINTY_OTHER_MODEL, /* options that it was not trained with */
-    UNCERTAINTY_OUTSIDE,     /* the measured case is outside the training box, or too many samples */
+    UNCERTAINTY_OUTSIDE, /* the measured case is outside the training box, or too many samples */
     UNCERTAINTY_STATUS_COUNT
 };
 extern const char *const uncertainty_status_names[UNCERTAINTY_STATUS_COUNT];

@@ -60,7 +60,7 @@ static void sums_of_legendre_products(void **state)
     near(point.legendre[ISCHIA_R1][2], (3 * 0.25 - 1) / 2);
     near(point.legendre[ISCHIA_F][4], (35 * 0.0625 - 30 * 0.25 + 3) / 8);
     near(predictor_estimate_of(&p, &p.output[0], &point).value, 1.5); /* P3(0) = 0 */
-    const struct ischia_case soft = case_at(5, 1, 400);           /* -1, -1, 1 */
+    const struct ischia_case soft = case_at(5, 1, 400);               /* -1, -1, 1 */
     point = predictor_point_of(&p, &soft);
     const struct predictor_estimate e = predictor_estimate_of(&p, &p.output[0], &point);
     near(e.value, 2 + 1 - 0.5); /* P3(-1) = -1, P2(1) = 1 */
@@ -116,7 +116,8 @@ static void near_a_centre_its_weight_counts(void **state)
     point = predictor_point_of(&p, &c);
     const double F = (300 * exp(0.3) - 300) / 100 / 9, near_one = 0.04 + F * F;
     const double one = 1 + near_one / 4, two = 1 + (1 + near_one) / 4;
-    near(predictor_estimate_of(&p, &p.output[0], &point).value, 1 + 2 / (one * one) - 0.5 / (two * two));
+    near(predictor_estimate_of(&p, &p.output[0], &point).value,
+         1 + 2 / (one * one) - 0.5 / (two * two));
     predictor_finish(&p);
 }
 

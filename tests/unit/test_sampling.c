@@ -27,7 +27,8 @@ static void the_distribution_is_the_truncated_normal(void **state)
 {
     static const struct {
         double mean, sd, low, high;
-    } cases[] = {{10, 2, 3, 15}, {3, 1, 3, 15}, {3.5, 4, 3, 15}, {14.9, 0.7, 3, 15}, {20, 5, 40, 90}};
+    } cases[] = {
+        {10, 2, 3, 15}, {3, 1, 3, 15}, {3.5, 4, 3, 15}, {14.9, 0.7, 3, 15}, {20, 5, 40, 90}};
     (void)state;
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
         const double m = cases[k].mean, s = cases[k].sd, low = cases[k].low, high = cases[k].high;
@@ -38,7 +39,8 @@ static void the_distribution_is_the_truncated_normal(void **state)
             /* upper tails: they keep their digits where the limits are far above the mean */
             const double all = phi((m - low) / s) - phi((m - high) / s);
             const double below = (phi((m - low) / s) - phi((m - x) / s)) / all;
-            if (!(fabs(below - u) < 1e-9)) fail_msg("case %zu: P(%g) is %g, not %g", k, x, below, u);
+            if (!(fabs(below - u) < 1e-9))
+                fail_msg("case %zu: P(%g) is %g, not %g", k, x, below, u);
             assert_true(x > last || i == 0);
             assert_true(x > low && x < high); /* nothing lies on the limits */
             last = x;

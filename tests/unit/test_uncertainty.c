@@ -15,23 +15,25 @@
 #include "api/uncertainty_doc.h"
 #include "solver/study/sampling.h"
 
-#define IN(key, min, max)                                                                          \
-    "\"" key "\":{\"min\":" #min ",\"max\":" #max ",\"log\":false}"
+#define IN(key, min, max) "\"" key "\":{\"min\":" #min ",\"max\":" #max ",\"log\":false}"
 #define HEAD                                                                                       \
     "{\"model\":{\"name\":\"macron2020-local\",\"version\":1},\"rows\":100,\"trial\":true,"        \
-    "\"case\":{\"resolution\":\"coarse\"},\"inputs\":{" IN("R1", 3, 15) "," IN("R2", 8, 120) ","   \
-    IN("eM", 19, 39) "," IN("eF", 9, 35) "," IN("muM", 0.5, 30) "," IN("muF", 2, 8) ","            \
-    IN("F", 100, 500) "},\"outputs\":["
+    "\"case\":{\"resolution\":\"coarse\"},\"inputs\":{" IN("R1", 3, 15) "," IN(                    \
+        "R2", 8, 120) "," IN("eM", 19,                                                             \
+                             39) "," IN("eF", 9,                                                   \
+                                        35) "," IN("muM", 0.5,                                     \
+                                                   30) "," IN("muF", 2,                            \
+                                                              8) "," IN("F", 100,                  \
+                                                                        500) "},\"outputs\":["
 #define OUT(name, power, mean, reach)                                                              \
     "{\"name\":\"" name "\",\"power\":" #power ",\"reach\":" #reach ",\"held_out_rms\":0.1,"       \
     "\"mean\":" mean ",\"spread\":[[0,0,0,0,0,0,0,0]]}"
 
-/* eps_max = 1 - 6 (R1 - 9)/6 + 2.8 (muM - 15.25)/14.75, forces constant: 250 N, E_shear 0.75 + eM. */
+/* eps_max = 1 - 0.1 (R1 - 9) + 0.02 (muM - 15.25); E_shear = 0.75 + (eM - 29) / 10; a force. */
 #define LINEAR                                                                                     \
-    HEAD OUT("eps_max", 1,                                                                         \
-             "[[0,0,0,0,0,0,0,1],[1,0,0,0,0,0,0,-0.6],[0,0,0,0,1,0,0,0.295]]", 0) ","              \
-    OUT("E_shear_max", 1, "[[0,0,0,0,0,0,0,0.75],[0,0,1,0,0,0,0,1]]", 0) ","                       \
-    OUT("force_shear_N", 1, "[[0,0,0,0,0,0,0,250]]", 0) "]}"
+    HEAD OUT("eps_max", 1, "[[0,0,0,0,0,0,0,1],[1,0,0,0,0,0,0,-0.6],[0,0,0,0,1,0,0,0.295]]",       \
+             0) "," OUT("E_shear_max", 1, "[[0,0,0,0,0,0,0,0.75],[0,0,1,0,0,0,0,1]]",              \
+                        0) "," OUT("force_shear_N", 1, "[[0,0,0,0,0,0,0,250]]", 0) "]}"
 
 static struct predictor read_predictor(const char *json)
 {
@@ -103,9 +105,9 @@ static void a_linear_model_has_known_quantiles_and_indices(void **state)
 static void an_sd_of_zero_gives_the_point(void **state)
 {
     (void)state;
-    struct predictor p = read_predictor(HEAD OUT("eps_max", 1, "[[0,0,0,0,0,0,0,1]]", 0.3) ","
-                                        OUT("volume_shear_mm3", 2, "[[0,0,0,0,0,0,0,9]]", 3) ","
-                                        OUT("force_shear_N", 1, "[[0,0,0,0,0,0,0,90]]", 9) "]}");
+    struct predictor p = read_predictor(HEAD OUT("eps_max", 1, "[[0,0,0,0,0,0,0,1]]", 0.3) "," OUT(
+        "volume_shear_mm3", 2, "[[0,0,0,0,0,0,0,9]]", 3) "," OUT("force_shear_N", 1,
+                                                                 "[[0,0,0,0,0,0,0,90]]", 9) "]}");
     const struct ischia_case c = centre();
     const double sd[ISCHIA_PARAM_COUNT] = {0};
     const struct ischia_uncertainty u = compute(&p, &c, sd, 0.25, 1);
