@@ -114,14 +114,24 @@ def person_text(result):
     return f"### Table 2, {result['person']}\n\n{table(head, rows)}\n\n{verdict}\n"
 
 
+def whose(out):
+    """The emulator that the figures are of."""
+    path = out / "manifest.json"
+    if not path.exists():
+        return "No emulator is trained yet."
+    m = json.loads(path.read_text())
+    return (
+        f"Emulator `{m['sha256'][:12]}`, {m['program']}, {m['rows']} solves at "
+        f"{m['case']['resolution']} resolution, seed {m['seed']}."
+    )
+
+
 def page(a):
-    manifest = json.loads((a.out / "manifest.json").read_text())
     parts = [
         "# The emulator against full solves",
-        "Written by `emulator/make.py`; the figures are in `emulator/check`. What is computed: "
+        "Written by `emulator/make.py`; the figures are in its folder `check`. What is computed: "
         "[EMULATOR.md](EMULATOR.md), [UNCERTAINTY.md](UNCERTAINTY.md).",
-        f"Emulator `{manifest['sha256'][:12]}`, {manifest['program']}, {manifest['rows']} solves at "
-        f"{manifest['case']['resolution']} resolution, seed {manifest['seed']}.",
+        whose(a.out),
         "## Fresh points in the box of Table 1",
         "None of these had a part in the training. *Degree 2* is the published study's polynomial, "
         "fitted to the same solves in that box.",

@@ -70,7 +70,7 @@ export function Preview(props: { entry: SideEntry; inputs: ParameterInfo[]; side
   const e = use_answer(question, (signal) => estimate(side ?? {}, signal), WAIT_MS);
   return (
     <section class="preview" aria-label={`${t('form.preview.title')} · ${props.side}`}>
-      <h3>{t('form.preview.title')}</h3>
+      <p class="title">{t('form.preview.title')}</p>
       {!e && <p class="hint">{t('form.preview.waiting')}</p>}
       {e && e.strain && <Rows of={e} />}
       {e && !e.strain && <p>{t('form.preview.outside', { keys: outside(e) })}</p>}

@@ -151,8 +151,8 @@ function Certainty(props: { of: Finished }) {
     return <p class="certainty">{t(`uncertain.none.${u.status}`, { keys: keys_outside(u) })}</p>;
   const between = [
     `ε max ${interval_text(u.strain.eps_max, 3)}`,
-    `${t('glance.shear', { threshold: '' })} ${interval_text(u.clusters.shear.volume_mm3, 0, ' mm³')}`,
-    `${t('glance.both')} ${interval_text(u.clusters.both.volume_mm3, 0, ' mm³')}`,
+    `${t('numbers.v_shear')} ${interval_text(u.clusters.shear.volume_mm3, 0, ' mm³')}`,
+    `${t('numbers.v_both')} ${interval_text(u.clusters.both.volume_mm3, 0, ' mm³')}`,
   ];
   const better = by_share(u).map(([key, share]) => `${key} ${format_percent(share)}`);
   return (
