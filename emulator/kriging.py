@@ -10,7 +10,12 @@ tr(Q dK)/2 - (Qy)' dK (Qy)/2 with Q = C - C T (T'CT)^-1 T'C, C = (K + noise)^-1.
 a row from all others is (Qy)_i / Q_ii (Dubrule, Math. Geol. 15 (1983) 687).
 """
 
-import numpy as np
+import os
+
+# One thread repeats its bits, and several would wait for each other on small matrices. Before NumPy.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np  # noqa: E402
 
 ALPHA = 2.0
 LENGTHS = (0.3, 30.0)  # in scaled inputs, whose box is two long
@@ -82,12 +87,12 @@ def gradient(hyper, z, y, T):
     return out
 
 
-def learn(z, y, T, variance):
+def learn(z, y, T, variance, rounds):
     """Resilient steps along the signs of the gradient (Riedmiller and Braun, 1993): they need no
     likelihood, only its gradient."""
     hyper = Hyper(z.shape[1], variance)
     step, last = np.full(len(hyper.x), 0.2), np.zeros(len(hyper.x))
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         g = gradient(hyper, z, y, T)
         same = g * last
         step = np.clip(np.where(same > 0, step * 1.2, np.where(same < 0, step * 0.5, step)), 1e-4, 0.5)
@@ -100,12 +105,12 @@ def learn(z, y, T, variance):
 class Kriging:
     """Fitted to rows z [n, inputs], y [n] with trend columns T [n, terms]."""
 
-    def __init__(self, z, y, T, seed, learn_rows=900):
+    def __init__(self, z, y, T, seed, rounds=ROUNDS, learn_rows=900):
         rest = y - T @ np.linalg.lstsq(T, y, rcond=None)[0]
         variance = max(float(np.mean(rest**2)), 1e-12)
         rows = np.random.default_rng(seed).permutation(len(y))[:learn_rows]
         self.z = z
-        self.hyper = hyper = learn(z[rows], y[rows], T[rows], variance)
+        self.hyper = hyper = learn(z[rows], y[rows], T[rows], variance, rounds)
         k = hyper.scale * covariance(z, z, hyper.lengths)
         K = k + np.diag(hyper.noise(z))
         Q = projected(K, T)

@@ -136,8 +136,10 @@ def compare(a, name):
     counted = [r for r in solved if is_inside(document, r)]
     quantities = {}
     for column, place in QUANTITIES:
-        values = np.array([float(r[column]) for r in counted if r[column]])
-        full, ours = np.quantile(values, QUANTILES), np.array(within(u, place), dtype=float)
+        values, said = [float(r[column]) for r in counted if r[column]], within(u, place)
+        if not values or None in said:
+            continue  # a threshold that samples do not reach
+        full, ours = np.quantile(values, QUANTILES), np.array(said)
         quantities[column] = {
             "full": full.tolist(),
             "emulator": ours.tolist(),

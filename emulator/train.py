@@ -154,20 +154,20 @@ def rms(x):
     return float(f"{math.sqrt(np.mean(x**2)):.4g}")
 
 
-def best_fit(z, y, seed):
+def best_fit(z, y, seed, rounds):
     """Of the trends the one whose predictions of left-out rows are best."""
     best = None
     for total, together in TRENDS:
         degrees = degrees_up_to(total, together)
         if 2 * len(degrees) > len(y):
             continue
-        fitted = kriging.Kriging(z, y, basis(z[:, : len(INPUTS)], degrees), seed)
+        fitted = kriging.Kriging(z, y, basis(z[:, : len(INPUTS)], degrees), seed, rounds)
         if best is None or np.mean(fitted.left_out**2) < np.mean(best[0].left_out**2):
             best = fitted, degrees
     return best
 
 
-def train_output(name, power, rows, z, seed):
+def train_output(name, power, rows, z, seed, rounds):
     """z [rows, coordinates]; None when too few rows have the output."""
     has = np.array([bool(r.get(name)) for r in rows])
     if has.sum() < ROWS_MIN:
@@ -175,7 +175,7 @@ def train_output(name, power, rows, z, seed):
     plain = z[has][:, : len(INPUTS)]
     value = np.array([float(r[name]) for r in rows if r.get(name)])
     y = np.sqrt(np.maximum(value, 0)) if power == 2 else value
-    fitted, degrees = best_fit(z[has], y, seed)
+    fitted, degrees = best_fit(z[has], y, seed, rounds)
     inner = np.abs(plain).max(1) < 1 - 1e-9
     spread_degrees, spread_theta, reach = spread_of(plain, fitted.left_out, inner)
     held_out = raised(y - fitted.left_out, power) - value
@@ -217,7 +217,7 @@ def document_of(rows, a):
     box, ranges = box_of(rows), group_ranges(rows)
     z = coordinates(rows, box, ranges)
     version, model = model_of(a.program)
-    trained = (train_output(n, p, rows, z, a.seed) for n, p in OUTPUTS)
+    trained = (train_output(n, p, rows, z, a.seed, a.rounds) for n, p in OUTPUTS)
     return {
         "program": version,
         "model": model,
@@ -257,6 +257,7 @@ def main():
     parse.add_argument("--resolution", default="standard", help="of the solves")
     parse.add_argument("--model", default="default", help="of the solves")
     parse.add_argument("--seed", type=int, default=1)
+    parse.add_argument("--rounds", type=int, default=kriging.ROUNDS, help="of the search for lengths")
     parse.add_argument("--trial", action="store_true", help="not to be relied on, and it says so")
     a = parse.parse_args()
     rows = distinct(read_rows(a.rows))

@@ -544,6 +544,8 @@ export class StandIn {
     const stream = { id, response };
     this.streams.add(stream);
     response.on('close', () => this.streams.delete(stream));
+    const document = this.documents.get(id);
+    if (ended(document)) this.tell(document); /* between the page's look and its listening */
   }
 
   async file(path, tag, response) {

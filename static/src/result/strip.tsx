@@ -78,7 +78,7 @@ function Strip(props: {
       ))}
       {ours.map((v, i) => (
         <g key={i} class={`ours n${i}`}>
-          <Bar of={bars[i] ?? null} x={x} />
+          <Bar of={bars[i] ?? null} index={i} x={x} />
           <path d={`M${x(v)} ${line_y - 6}l-6 -10h12z`} />
           <text
             x={x(v)}
@@ -95,12 +95,12 @@ function Strip(props: {
 }
 
 /* Between 5 and 95 % of the samples of uncertain measurements. */
-function Bar(props: { of: Interval | null; x: (v: number) => number }) {
+function Bar(props: { of: Interval | null; index: number; x: (v: number) => number }) {
   if (!props.of) return null;
   const [a, b] = [props.x(props.of.low), props.x(props.of.high)];
-  return (
-    <path class="interval" d={`M${a} ${line_y}H${b}M${a} ${line_y - 6}v12M${b} ${line_y - 6}v12`} />
-  );
+  const y =
+    line_y + (props.index ? 4 : -4); /* two sides beside each other, not one over the other */
+  return <path class="interval" d={`M${a} ${y}H${b}M${a} ${y - 3}v6M${b} ${y - 3}v6`} />;
 }
 
 const median = (sorted: number[]): number => {
