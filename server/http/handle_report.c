@@ -359,24 +359,30 @@ static void put_no_interval(const struct report *r, const struct ischia_uncertai
     page_put(r->out, "</p>\n");
 }
 
+static void put_any(const struct report *r, const struct ischia_uncertainty *u)
+{
+    page_put(r->out, "<div class=\"uncertain\">\n");
+    if (u->trial) {
+        page_put(r->out, "<p>");
+        page_word(r->out, r->language, WORD_UNCERTAIN_TRIAL);
+        page_put(r->out, "</p>\n");
+    }
+    if (u->status == UNCERTAINTY_GIVEN) {
+        put_intervals(r, u);
+        put_certainty(r, u);
+    } else {
+        put_no_interval(r, u);
+    }
+    page_put(r->out, "</div>\n");
+}
+
 /* Nothing for a result whose inputs were taken as exact. */
 static enum ischia_code put_uncertainty(const struct report *r, struct ischia_error *err)
 {
     struct ischia_uncertainty u;
     bool present = false;
     TRY(uncertainty_doc_read(&u, &present, r->row->result_json, strlen(r->row->result_json), err));
-    if (!present) return ISCHIA_OK;
-    if (u.trial) {
-        page_put(r->out, "<p>");
-        page_word(r->out, r->language, WORD_UNCERTAIN_TRIAL);
-        page_put(r->out, "</p>\n");
-    }
-    if (u.status != UNCERTAINTY_GIVEN) {
-        put_no_interval(r, &u);
-        return ISCHIA_OK;
-    }
-    put_intervals(r, &u);
-    put_certainty(r, &u);
+    if (present) put_any(r, &u);
     return ISCHIA_OK;
 }
 
