@@ -28,6 +28,15 @@ static void write_options(struct json_out *out, const char *key, const void *bas
     case_doc_write_options(out, &((const struct assessment *)base)->request);
 }
 
+static void write_sd(struct json_out *out, const char *key, const void *base)
+{
+    const struct ischia_request *request = &((const struct assessment *)base)->request;
+    if (request->has_sd)
+        case_doc_write_sd(out, request);
+    else
+        json_put_null(out, key);
+}
+
 static void put_raw_or_null(struct json_out *out, const char *key, const char *json)
 {
     if (json != NULL)
@@ -108,6 +117,7 @@ static const struct field assessment_fields[] = {
     TEXT("label", FIELD_TEXT_OR_NULL, request.label, ISCHIA_LABEL_BYTES),
     TEXT("measured_at", FIELD_TEXT_OR_NULL, request.measured_at, ISCHIA_MEASURED_AT_BYTES),
     {.key = "parameters", .kind = FIELD_CUSTOM, .custom_write = write_parameters},
+    {.key = "sd", .kind = FIELD_CUSTOM, .custom_write = write_sd},
     {.key = "options", .kind = FIELD_CUSTOM, .custom_write = write_options},
     {.key = "progress", .kind = FIELD_NUMBER, .offset = offsetof(struct assessment, progress)},
     {.key = "result", .kind = FIELD_CUSTOM, .custom_write = write_result},

@@ -98,11 +98,30 @@ static void read_skin(struct case_doc_fields *fields, int key, const struct json
         refuse_type(fields, key, value);
 }
 
-static void refuse_sd(struct case_doc_fields *fields, int key, const struct json *value)
+static void read_one_sd(struct case_doc_fields *fields, const struct json *member)
 {
-    (void)value;
-    case_key_refuse(fields, key, "unsupported",
-                    words_get(fields->faults->language, WORD_DAEMON_FAULT_GIVEN));
+    char pointer[DOC_POINTER_BYTES], name[64];
+    const int input = case_key_find(json_key(member));
+    if (input == KEY_NONE || input >= ISCHIA_PARAM_COUNT) {
+        (void)doc_pointer(pointer, sizeof pointer, "/sd", json_key(member));
+        case_key_unknown(fields, pointer, json_key(member));
+        return;
+    }
+    (void)snprintf(name, sizeof name, "sd.%s", json_key(member));
+    if (case_key_first_time(fields, KEY_FIRST_SD + input, name))
+        read_number(fields, KEY_FIRST_SD + input, member);
+}
+
+/* "typical", or an object with a number for each input that is not known exactly. */
+static void read_sd(struct case_doc_fields *fields, int key, const struct json *value)
+{
+    if (json_type_of(value) != JSON_OBJECT) {
+        read_text(fields, key, value);
+        return;
+    }
+    fields->request->has_sd = true;
+    for (const struct json *m = json_first(value); m != NULL; m = json_next(m))
+        read_one_sd(fields, m);
 }
 
 static void (*const readers[KEY_FIRST_OPTION])(struct case_doc_fields *, int,
@@ -111,7 +130,7 @@ static void (*const readers[KEY_FIRST_OPTION])(struct case_doc_fields *, int,
     [ISCHIA_EF] = read_number,     [ISCHIA_MUM] = read_number, [ISCHIA_MUF] = read_number,
     [ISCHIA_F] = read_number,      [KEY_SUBJECT] = read_text,  [KEY_SIDE] = read_text,
     [KEY_MEASURED_AT] = read_text, [KEY_LABEL] = read_text,    [KEY_RESOLUTION] = read_text,
-    [KEY_MODEL] = read_model,      [KEY_SKIN] = read_skin,     [KEY_SD] = refuse_sd,
+    [KEY_MODEL] = read_model,      [KEY_SKIN] = read_skin,     [KEY_SD] = read_sd,
 };
 
 static void read_member(struct case_doc_fields *fields, const struct json *member)
@@ -266,6 +285,20 @@ void case_doc_write_options(struct json_out *out, const struct ischia_request *r
     json_close_object(out);
 }
 
+/* Of an object every input, so that what is kept can be read without knowing what 0 means. */
+void case_doc_write_sd(struct json_out *out, const struct ischia_request *request)
+{
+    if (!request->has_sd) return;
+    if (request->sd_typical) {
+        json_put_string(out, "sd", "typical");
+        return;
+    }
+    json_open_object(out, "sd");
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
+        json_put_number(out, ischia_params[i].key, request->sd[i]);
+    json_close_object(out);
+}
+
 void case_doc_write(struct json_out *out, const struct ischia_request *request)
 {
     const struct {
@@ -279,5 +312,6 @@ void case_doc_write(struct json_out *out, const struct ischia_request *request)
     case_doc_write_parameters(out, &request->values);
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         if (texts[i].value[0] != '\0') json_put_string(out, texts[i].key, texts[i].value);
+    case_doc_write_sd(out, request);
     case_doc_write_options(out, request);
 }

@@ -33,7 +33,13 @@ struct ischia_request {
     char label[ISCHIA_LABEL_BYTES];             /* UTF-8; "": not given                   */
     char measured_at[ISCHIA_MEASURED_AT_BYTES]; /* RFC 3339 date or time; "": not given   */
     char preset[ISCHIA_PRESET_BYTES];           /* name of the set of options started from */
+    bool has_sd;                                /* the inputs are known up to these:       */
+    bool sd_typical;                            /* sampling_sd_typical's, or               */
+    double sd[ISCHIA_PARAM_COUNT];              /* in the unit of the input; 0: exactly    */
 };
+
+/* The standard deviations of a good request; all 0 when none were given. */
+void case_doc_sd(const struct ischia_request *request, double ret[ISCHIA_PARAM_COUNT]);
 
 /* Everything at its default, all seven inputs missing (NaN). */
 void ischia_request_init(struct ischia_request *ret);
@@ -64,17 +70,18 @@ void case_doc_read_value_over(struct ischia_request *ret, const struct case_doc_
 
 /*
  * application/x-www-form-urlencoded. Keys as in JSON; options of the groups as "skin.mu" and
- * "model.friction"; a number may be typed as people type it, with a decimal comma or point (see
- * text_to_typed_number); an empty value is the same as none. ISCHIA_E_INPUT: a broken escape,
- * invalid UTF-8, a NUL.
+ * "model.friction", standard deviations as "sd.R2"; a number may be typed as people type it, with
+ * a decimal comma or point (see text_to_typed_number); an empty value is the same as none.
+ * ISCHIA_E_INPUT: a broken escape, invalid UTF-8, a NUL.
  */
 ISCHIA_MUST_CHECK enum ischia_code
 case_doc_read_form(struct ischia_request *ret, const char *body, size_t length, size_t bytes_max,
                    struct doc_faults *faults, struct ischia_error *err);
 
 /*
- * Field by field, for forms and CSV rows: init, set each, end. The key is one of JSON's keys in any
- * accepted spelling or "group.key"; space around a value is ignored and an empty value is none.
+ * Field by field, for forms and CSV rows: init, set each, end. The key is one of JSON's keys in
+ * any accepted spelling or "group.key" or "sd.key"; space around a value is ignored and an empty
+ * value is none.
  */
 struct case_doc_fields {
     struct ischia_request *request;
@@ -82,6 +89,7 @@ struct case_doc_fields {
     unsigned seen;                      /* bit k: key k of the table was given             */
     bool typed;                         /* a person typed the numbers; off: as in JSON     */
     double option[ISCHIA_OPTION_COUNT]; /* NaN: not given; applied over the preset at the end */
+    double sd[ISCHIA_PARAM_COUNT];      /* NaN: not given; over "typical" at the end        */
 };
 void case_doc_fields_init(struct case_doc_fields *ret, struct ischia_request *request,
                           struct doc_faults *faults); /* not typed */
@@ -104,6 +112,8 @@ const char *case_doc_nearest_key(const char *key);
 /* Writers, into the object that is open in out; reading back gives the same request bit by bit. */
 void case_doc_write(struct json_out *out, const struct ischia_request *request); /* all keys      */
 void case_doc_write_parameters(struct json_out *out, const struct ischia_case *c); /* the seven   */
+void case_doc_write_sd(struct json_out *out,
+                       const struct ischia_request *request); /* nothing when not given */
 void case_doc_write_options(struct json_out *out,
                             const struct ischia_request *request); /* skin, resolution, model */
 

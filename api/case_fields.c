@@ -6,6 +6,7 @@
 
 #include "api/case_keys.h"
 #include "api/case_words.h"
+#include "solver/study/sampling.h"
 
 _Static_assert(KEY_COUNT <= 32, "case_doc_fields.seen has one bit for each key");
 
@@ -19,6 +20,14 @@ void ischia_request_init(struct ischia_request *ret)
 {
     *ret = (struct ischia_request){.values = ischia_case_default()};
     (void)snprintf(ret->preset, sizeof ret->preset, "%s", ischia_presets[0].name);
+}
+
+void case_doc_sd(const struct ischia_request *request, double ret[ISCHIA_PARAM_COUNT])
+{
+    if (request->sd_typical)
+        sampling_sd_typical(&request->values, ret);
+    else
+        memcpy(ret, request->sd, sizeof request->sd);
 }
 
 /* ---- the keys ---- */
@@ -41,6 +50,13 @@ static const char *const key_names[KEY_COUNT] = {
     [KEY_FIRST_OPTION + ISCHIA_FRICTION] = "model.friction",
     [KEY_FIRST_OPTION + ISCHIA_R2_SURFACE] = "model.R2_surface",
     [KEY_FIRST_OPTION + ISCHIA_EMBED_OVER_R1] = "model.embed_over_R1",
+    [KEY_FIRST_SD + ISCHIA_R1] = "sd.R1",
+    [KEY_FIRST_SD + ISCHIA_R2] = "sd.R2",
+    [KEY_FIRST_SD + ISCHIA_EM] = "sd.eM",
+    [KEY_FIRST_SD + ISCHIA_EF] = "sd.eF",
+    [KEY_FIRST_SD + ISCHIA_MUM] = "sd.muM",
+    [KEY_FIRST_SD + ISCHIA_MUF] = "sd.muF",
+    [KEY_FIRST_SD + ISCHIA_F] = "sd.F",
 };
 
 /* What other texts call our parameters: the paper's own second names, and plain words. */
@@ -187,6 +203,9 @@ static const char *accepted(enum language language, int key, char *text, size_t 
     if (key < ISCHIA_PARAM_COUNT) {
         const struct ischia_param_info *p = &ischia_params[key];
         accepted_range(language, text, size, p->accepted_min, p->accepted_max, p->unit);
+    } else if (key >= KEY_FIRST_SD) {
+        const enum ischia_param input = (enum ischia_param)(key - KEY_FIRST_SD);
+        accepted_range(language, text, size, 0, sampling_sd_max(input), ischia_params[input].unit);
     } else if (key >= KEY_FIRST_OPTION) {
         const struct ischia_option_info *o = &ischia_options[key - KEY_FIRST_OPTION];
         accepted_range(language, text, size, o->accepted_min, o->accepted_max, o->unit);
@@ -226,12 +245,25 @@ void case_key_unknown(struct case_doc_fields *fields, const char *pointer, const
                        WORDS(word_text("key", shown), word_text("nearest", nearest)));
         return;
     }
-    for (int key = 0; key < KEY_SD; key++) append(known, sizeof known, case_key_name(key));
+    for (int key = 0; key <= KEY_SD; key++) append(known, sizeof known, case_key_name(key));
     doc_faults_say(fields->faults, pointer, "unknown", WORD_DAEMON_FAULT_UNKNOWN,
                    WORDS(word_text("key", shown), word_text("known", known)));
 }
 
 /* ---- values ---- */
+
+static void set_sd(struct case_doc_fields *fields, int key, double value)
+{
+    const enum ischia_param input = (enum ischia_param)(key - KEY_FIRST_SD);
+    char given[TEXT_NUMBER_BYTES];
+    fields->request->has_sd = true;
+    if (value >= 0 && value <= sampling_sd_max(input)) {
+        fields->sd[input] = value;
+        return;
+    }
+    (void)snprintf(given, sizeof given, "%g", value);
+    case_key_refuse(fields, key, "out_of_range", given);
+}
 
 void case_key_set_number(struct case_doc_fields *fields, int key, double value)
 {
@@ -242,6 +274,8 @@ void case_key_set_number(struct case_doc_fields *fields, int key, double value)
         case_key_refuse(fields, key, "not_finite", given);
     } else if (key < ISCHIA_PARAM_COUNT) {
         fields->request->values.param[key] = value;
+    } else if (key >= KEY_FIRST_SD) {
+        set_sd(fields, key, value);
     } else {
         fields->option[key - KEY_FIRST_OPTION] = value;
     }
@@ -309,6 +343,13 @@ static bool set_model(struct ischia_request *request, const char *value)
     return false;
 }
 
+static bool set_typical_sd(struct ischia_request *request, const char *value)
+{
+    if (strcmp(value, "typical") != 0) return false;
+    request->has_sd = request->sd_typical = true;
+    return true;
+}
+
 static const struct text_setter {
     bool (*set)(struct ischia_request *request, const char *value);
     const char *code;
@@ -320,6 +361,7 @@ static const struct text_setter {
     [KEY_LABEL] = {set_label, "malformed", false},
     [KEY_RESOLUTION] = {set_resolution, "not_allowed", true},
     [KEY_MODEL] = {set_model, "not_allowed", true},
+    [KEY_SD] = {set_typical_sd, "not_allowed", true},
 };
 
 static const char *quoted(const char *value, char *buffer, size_t size)
@@ -349,6 +391,7 @@ void case_doc_fields_init(struct case_doc_fields *ret, struct ischia_request *re
     *ret = (struct case_doc_fields){.request = request, .faults = faults};
     ischia_request_init(request);
     for (int i = 0; i < ISCHIA_OPTION_COUNT; i++) ret->option[i] = (double)NAN;
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) ret->sd[i] = (double)NAN;
 }
 
 /* Two decimal marks: what was meant cannot be known, so say how to write it. */
@@ -387,7 +430,7 @@ static void set_trimmed(struct case_doc_fields *fields, int key, const char *val
         set_number_text(fields, key, value);
     else if (text_setters[key].set != NULL)
         case_key_set_text(fields, key, value);
-    else
+    else /* a group: "skin" */
         case_key_refuse(fields, key, "unsupported",
                         words_get(fields->faults->language, WORD_DAEMON_FAULT_GIVEN));
 }
@@ -419,10 +462,27 @@ void case_doc_fields_set_defaults(struct case_doc_fields *fields,
     if (defaults->model != NULL) case_doc_fields_set(fields, "model", defaults->model);
 }
 
+/* What was given for one input holds over what is typical. */
+static void end_sd(struct case_doc_fields *fields)
+{
+    struct ischia_request *request = fields->request;
+    double sd[ISCHIA_PARAM_COUNT];
+    bool given = false;
+    case_doc_sd(request, sd);
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
+        given = given || !isnan(fields->sd[i]);
+        if (!isnan(fields->sd[i])) sd[i] = fields->sd[i];
+    }
+    if (!given || fields->faults->count > 0) return;
+    request->sd_typical = false;
+    memcpy(request->sd, sd, sizeof request->sd);
+}
+
 void case_doc_fields_end(struct case_doc_fields *fields)
 {
     double *option = fields->request->values.option;
     for (int i = 0; i < ISCHIA_OPTION_COUNT; i++)
         if (!isnan(fields->option[i])) option[i] = fields->option[i];
     doc_faults_add_case(fields->faults, &fields->request->values);
+    end_sd(fields);
 }

@@ -6,7 +6,8 @@
 
 /* What the readers of a case share: the keys and what is done with each. For api/case_*.c only. */
 
-/* Keys 0 ... ISCHIA_PARAM_COUNT - 1 are the seven inputs, then these, then one for each option. */
+/* Keys 0 ... ISCHIA_PARAM_COUNT - 1 are the seven inputs, then these, then one for each option,
+ * then one for the standard deviation of each input. */
 enum case_key {
     KEY_SUBJECT = ISCHIA_PARAM_COUNT,
     KEY_SIDE,
@@ -17,7 +18,8 @@ enum case_key {
     KEY_SKIN,
     KEY_SD,
     KEY_FIRST_OPTION,
-    KEY_COUNT = KEY_FIRST_OPTION + ISCHIA_OPTION_COUNT,
+    KEY_FIRST_SD = KEY_FIRST_OPTION + ISCHIA_OPTION_COUNT,
+    KEY_COUNT = KEY_FIRST_SD + ISCHIA_PARAM_COUNT,
     KEY_NONE = -1
 };
 
@@ -32,7 +34,7 @@ bool case_key_first_time(struct case_doc_fields *fields, int key, const char *sp
 void case_key_refuse(struct case_doc_fields *fields, int key, const char *code, const char *given);
 void case_key_unknown(struct case_doc_fields *fields, const char *pointer, const char *spelling);
 
-/* A number for an input or an option; a text for one of the others. */
+/* A number for an input, an option or a standard deviation; a text for one of the others. */
 void case_key_set_number(struct case_doc_fields *fields, int key, double value);
 void case_key_set_text(struct case_doc_fields *fields, int key, const char *value);
 

@@ -12,7 +12,7 @@ static bool is_kept_only(const char *key)
     static const char *const kept[] = {"subject", "side", "measured_at", "label", "skin", "sd"};
     for (size_t i = 0; i < sizeof kept / sizeof kept[0]; i++)
         if (strcmp(key, kept[i]) == 0) return true;
-    return false;
+    return strncmp(key, "sd.", 3) == 0;
 }
 
 static const char *meaning_of(const char *column)

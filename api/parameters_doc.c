@@ -8,6 +8,7 @@
 #include "api/case_words.h"
 #include "api/json.h"
 #include "api/risk.h"
+#include "solver/study/sampling.h"
 
 static void put_range(struct json_out *out, const char *key, double min, double max)
 {
@@ -39,6 +40,18 @@ static void write_aliases(struct json_out *out, const char *key)
     json_close_array(out);
 }
 
+/* Which standard deviations are accepted, and what "typical" stands for. */
+static void write_sd(struct json_out *out, enum ischia_param input)
+{
+    json_open_object(out, "sd");
+    json_put_number(out, "max", sampling_sd_max(input));
+    json_open_object(out, "typical");
+    json_put_number(out, "absolute", sampling_typical[input].absolute);
+    json_put_number(out, "relative", sampling_typical[input].relative);
+    json_close_object(out);
+    json_close_object(out);
+}
+
 static void write_parameters(struct json_out *out, enum language language)
 {
     json_open_array(out, "parameters");
@@ -52,6 +65,7 @@ static void write_parameters(struct json_out *out, enum language language)
         json_put_string(out, "description", words_get(language, param_words[i].help));
         put_range(out, "accepted", p->accepted_min, p->accepted_max);
         put_range(out, "studied", p->studied_min, p->studied_max);
+        write_sd(out, (enum ischia_param)i);
         json_close_object(out);
     }
     json_close_array(out);

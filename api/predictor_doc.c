@@ -17,7 +17,7 @@ enum ischia_code predictor_doc_split(const char *text, size_t length,
                                      char ret_digest[PREDICTOR_DIGEST_DIGITS + 1],
                                      const char **ret_json, struct ischia_error *err)
 {
-    static const char start[] = "ischia emulator 1 sha256 ";
+    static const char start[] = "ischia emulator 2 sha256 ";
     const size_t head = sizeof start - 1 + PREDICTOR_DIGEST_DIGITS;
     CHECK(length > head && memcmp(text, start, sizeof start - 1) == 0 && text[head] == '\n', err,
           ISCHIA_E_INPUT, "it does not begin as a trained emulator does");
@@ -136,8 +136,69 @@ static enum ischia_code read_sum(const struct json *output, const char *key,
     return ISCHIA_OK;
 }
 
-static enum ischia_code read_output(const struct json *object, struct predictor_output *ret,
+/* Exactly `count` numbers, `step` places apart. */
+static bool read_numbers(const struct json *list, int count, int step, double *ret)
+{
+    if (list == NULL || json_type_of(list) != JSON_ARRAY || json_count(list) != (size_t)count)
+        return false;
+    for (const struct json *m = json_first(list); m != NULL; m = json_next(m), ret += step) {
+        if (json_type_of(m) != JSON_NUMBER) return false;
+        *ret = json_number(m);
+    }
+    return true;
+}
+
+static enum ischia_code read_groups(const struct json *root, struct predictor *p,
                                     struct ischia_error *err)
+{
+    const struct json *list = json_member(root, "groups");
+    CHECK(list == NULL || json_count(list) <= PREDICTOR_GROUPS_MAX, err, ISCHIA_E_INPUT,
+          "more than %d groups", (int)PREDICTOR_GROUPS_MAX);
+    for (const struct json *m = json_first(list); m != NULL; m = json_next(m)) {
+        struct predictor_group *group = &p->group[p->group_count++];
+        CHECK(read_numbers(json_member(m, "powers"), ISCHIA_PARAM_COUNT, 1, group->power), err,
+              ISCHIA_E_INPUT, "powers of group %d are no %d numbers", p->group_count,
+              (int)ISCHIA_PARAM_COUNT);
+        TRY(number_of(m, "low", &group->low, err));
+        TRY(number_of(m, "high", &group->high, err));
+    }
+    return ISCHIA_OK;
+}
+
+/* The solves that it was trained with, by their inputs; a file may have none. */
+static enum ischia_code read_centres(const struct json *root, struct predictor *p,
+                                     struct ischia_error *err)
+{
+    const struct json *list = json_member(root, "centres");
+    int j = 0;
+    TRY(predictor_reserve(p, list == NULL ? 0 : (int)json_count(list), err));
+    for (const struct json *m = json_first(list); m != NULL; m = json_next(m), j++) {
+        double param[ISCHIA_PARAM_COUNT], coordinate[PREDICTOR_COORDINATES_MAX];
+        CHECK(read_numbers(m, ISCHIA_PARAM_COUNT, 1, param), err, ISCHIA_E_INPUT,
+              "centre %d is no list of %d numbers", j + 1, (int)ISCHIA_PARAM_COUNT);
+        const int count = predictor_coordinates(p, param, coordinate);
+        for (int i = 0; i < count; i++) p->centre[i * p->stride + j] = coordinate[i];
+    }
+    return ISCHIA_OK;
+}
+
+static enum ischia_code read_kernel(const struct json *object, const struct predictor *p,
+                                    struct predictor_output *ret, struct ischia_error *err)
+{
+    const struct json *kernel = json_member(object, "kernel");
+    if (kernel == NULL) return ISCHIA_OK;
+    const int coordinates = ISCHIA_PARAM_COUNT + p->group_count;
+    CHECK(read_numbers(json_member(kernel, "lengths"), coordinates, 1, ret->length), err,
+          ISCHIA_E_INPUT, "lengths is no list of %d numbers", coordinates);
+    ret->weight = calloc((size_t)p->stride + 1, sizeof *ret->weight);
+    CHECK(ret->weight != NULL, err, ISCHIA_E_MEMORY, "out of memory for %d weights", p->stride);
+    CHECK(read_numbers(json_member(kernel, "weights"), p->centre_count, 1, ret->weight), err,
+          ISCHIA_E_INPUT, "weights is no list of %d numbers", p->centre_count);
+    return ISCHIA_OK;
+}
+
+static enum ischia_code read_output(const struct json *object, const struct predictor *p,
+                                    struct predictor_output *ret, struct ischia_error *err)
 {
     const char *name = "";
     double power = 0;
@@ -149,6 +210,7 @@ static enum ischia_code read_output(const struct json *object, struct predictor_
     TRY(number_of(object, "held_out_rms", &ret->held_out_rms, err));
     ret->power = power == 2 ? 2 : power == 1 ? 1 : 0;
     TRY(read_sum(object, "mean", &ret->mean, err));
+    TRY(read_kernel(object, p, ret, err));
     return read_sum(object, "spread", &ret->spread, err);
 }
 
@@ -159,7 +221,7 @@ static enum ischia_code read_outputs(const struct json *root, struct predictor *
     CHECK(list != NULL && json_count(list) <= PREDICTOR_OUTPUTS_MAX, err, ISCHIA_E_INPUT,
           "outputs are missing, or more than %d", (int)PREDICTOR_OUTPUTS_MAX);
     for (const struct json *m = json_first(list); m != NULL; m = json_next(m))
-        TRY(read_output(m, &p->output[p->output_count++], err));
+        TRY(read_output(m, p, &p->output[p->output_count++], err));
     return ISCHIA_OK;
 }
 
@@ -174,6 +236,8 @@ static enum ischia_code read_all(const struct json *root, struct predictor *p,
     p->rows = (int)rows;
     TRY(read_case(root, p, err));
     TRY(read_inputs(root, p, err));
+    TRY(read_groups(root, p, err));
+    TRY(read_centres(root, p, err));
     TRY(read_outputs(root, p, err));
     CHECK(predictor_is_valid(p), err, ISCHIA_E_INPUT, "a number in it is out of bounds");
     return ISCHIA_OK;

@@ -9,7 +9,7 @@
 
 /*
  * A trained emulator's file, as emulator/train.py writes it (docs/EMULATOR.md). Its first line is
- *   ischia emulator 1 sha256 HEX
+ *   ischia emulator 2 sha256 HEX
  * with the digest of all that follows, one JSON object.
  */
 enum { PREDICTOR_DIGEST_DIGITS = 64, PREDICTOR_FILE_BYTES_MAX = 16 * 1024 * 1024 };

@@ -8,6 +8,7 @@
 
 #include "api/fields.h"
 #include "api/risk.h"
+#include "api/uncertainty_doc.h"
 
 /* What the tables below describe: the result, and what the document says beside it. */
 struct view {
@@ -269,9 +270,9 @@ void result_doc_write(struct json_out *out, const struct ischia_case *c,
     fields_write(out, result_fields, &view);
 }
 
-enum ischia_code result_doc_text(char **ret_text, const struct ischia_case *c,
-                                 const struct ischia_result *result, int indent,
-                                 struct ischia_error *err)
+enum ischia_code
+result_doc_text(char **ret_text, const struct ischia_case *c, const struct ischia_result *result,
+                const struct ischia_uncertainty *uncertainty, int indent, struct ischia_error *err)
 {
     struct json_out out;
     CHECK(is_presentable(result), err, ISCHIA_E_NUMERIC,
@@ -279,6 +280,7 @@ enum ischia_code result_doc_text(char **ret_text, const struct ischia_case *c,
     json_out_init(&out, indent);
     json_open_object(&out, NULL);
     result_doc_write(&out, c, result);
+    if (uncertainty != NULL) uncertainty_doc_put(&out, uncertainty);
     json_close_object(&out);
     return json_out_take(&out, ret_text, NULL, err);
 }

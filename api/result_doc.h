@@ -7,6 +7,7 @@
 #include "api/json.h"
 #include "solver/case.h"
 #include "solver/result.h"
+#include "solver/study/uncertainty.h"
 
 /*
  * The "result" object. A result that did not converge is written with null for strain, clusters,
@@ -26,10 +27,11 @@ struct result_model {
 void result_doc_write(struct json_out *out, const struct ischia_case *c,
                       const struct ischia_result *result);
 
-/* The whole object as one text (indent as json_out), the caller's to free. */
-ISCHIA_MUST_CHECK enum ischia_code result_doc_text(char **ret_text, const struct ischia_case *c,
-                                                   const struct ischia_result *result, int indent,
-                                                   struct ischia_error *err);
+/* The whole object as one text (indent as json_out), the caller's to free. uncertainty: NULL when
+ * the inputs were taken as exact; else its member (uncertainty_doc.h) comes last. */
+ISCHIA_MUST_CHECK enum ischia_code
+result_doc_text(char **ret_text, const struct ischia_case *c, const struct ischia_result *result,
+                const struct ischia_uncertainty *uncertainty, int indent, struct ischia_error *err);
 
 /*
  * Reads what result_doc_write wrote, bit for bit; keys it does not know are ignored. Errors as

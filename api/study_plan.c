@@ -84,6 +84,17 @@ static void read_levels(const struct reader *in, struct design_factor *factor)
     }
 }
 
+/* "log": by ratio between the levels; "linear" (the usual): by difference. */
+static void read_scale(const struct reader *in, struct design_factor *factor)
+{
+    const struct json *value = member_of_type(in, "scale", JSON_STRING);
+    if (value == NULL || strcmp(json_string(value), "linear") == 0) return;
+    factor->log = strcmp(json_string(value), "log") == 0;
+    if (!factor->log || (factor->level_count > 0 && !(factor->level[0] > 0)))
+        doc_faults_add(in->faults, in->pointer, "not_allowed",
+                       "scale is linear, or log where every level is above 0");
+}
+
 static bool levels_rise(const struct design_factor *factor)
 {
     for (int i = 1; i < factor->level_count; i++)
@@ -101,7 +112,7 @@ static bool named_before(const struct design *d, const struct design_factor *fac
 
 static void read_factor(const struct reader *in, struct design *d)
 {
-    static const char *const known[] = {"key", "levels", "min", "max", NULL};
+    static const char *const known[] = {"key", "levels", "min", "max", "scale", NULL};
     struct design_factor factor = {0};
     const struct json *key = member_of_type(in, "key", JSON_STRING);
     const char *name = key != NULL ? json_string(key) : "";
@@ -113,6 +124,7 @@ static void read_factor(const struct reader *in, struct design *d)
         return;
     }
     read_levels(in, &factor);
+    read_scale(in, &factor);
     if (!levels_rise(&factor)) {
         doc_faults_add(in->faults, in->pointer, "malformed",
                        "%s needs \"levels\": 2 to %d rising numbers, or \"min\" < \"max\"", name,

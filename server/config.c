@@ -56,8 +56,8 @@ const struct config_option config_options[] = {
            "Points that one study may have, and waiting points of all studies above which new "
            "ones are answered 429."),
     TEXT(emulator, "",
-         "File with a trained emulator, as emulator/train.py writes it, for estimates; empty: "
-         "none, and no estimates."),
+         "File with a trained emulator, as emulator/train.py writes it, for estimates and "
+         "intervals; empty: the one that came with the program; none: no estimates."),
     NUMBER("retention_days", retention_days, "d", 0, 36500, "0", true,
            "Age after which finished assessments are erased; 0: never."),
     NUMBER("retention_count", retention_count, "assessments", 0, INT_MAX, "0", true,

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "server/estimator.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "server/textfile.h"
 
@@ -46,4 +48,23 @@ void estimator_destroy(struct estimator *estimator)
     if (estimator == NULL) return;
     predictor_finish(&estimator->predictor);
     free(estimator);
+}
+
+/* Below where a package puts the programs, or where a build leaves ischiad and ischia. */
+bool estimator_installed(char ret_path[ESTIMATOR_PATH_BYTES])
+{
+    static const char *const places[] = {"../share/ischia/emulator.txt", "../emulator/emulator.txt",
+                                         "../../emulator/emulator.txt"};
+    char own[ESTIMATOR_PATH_BYTES - 64];
+    const ssize_t n = readlink("/proc/self/exe", own, sizeof own - 1);
+    if (n <= 0) return false;
+    own[n] = '\0';
+    char *slash = strrchr(own, '/');
+    if (slash == NULL) return false;
+    *slash = '\0';
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        (void)snprintf(ret_path, ESTIMATOR_PATH_BYTES, "%s/%s", own, places[i]);
+        if (access(ret_path, R_OK) == 0) return true;
+    }
+    return false;
 }

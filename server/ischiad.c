@@ -41,6 +41,7 @@ struct daemon {
     struct listener *hl7;     /* NULL: off   */
     struct outbound *outbound;
     char worker_program[PATH_MAX];
+    char emulator[ESTIMATOR_PATH_BYTES]; /* "": there is none */
     int64_t retire_at_ms, watchdog_at_ms;
 };
 
@@ -266,6 +267,26 @@ static enum ischia_code open_store(struct daemon *d, struct ischia_error *err)
     return open_patiently(&options, &d->service.store, err);
 }
 
+/* The one that was asked for must be good; one that came with the program and does not fit it only
+ * means that there are no estimates. */
+static enum ischia_code load_emulator(struct daemon *d, struct ischia_error *err)
+{
+    struct service *s = &d->service;
+    struct log_value quoted;
+    const char *wish = s->config.emulator;
+    if (strcmp(wish, "none") == 0) return ISCHIA_OK;
+    if (wish[0] != '\0')
+        (void)snprintf(d->emulator, sizeof d->emulator, "%s", wish);
+    else if (!estimator_installed(d->emulator))
+        d->emulator[0] = '\0';
+    if (d->emulator[0] == '\0') return ISCHIA_OK;
+    const enum ischia_code code = estimator_create(&s->estimator, d->emulator, err);
+    if (code == ISCHIA_OK || wish[0] != '\0') return code;
+    LOG_WARNING("no estimates", "detail=%s", log_quote(&quoted, err->message));
+    d->emulator[0] = '\0';
+    return ISCHIA_OK;
+}
+
 static enum ischia_code create_parts(struct daemon *d, struct ischia_error *err)
 {
     struct service *s = &d->service;
@@ -273,8 +294,7 @@ static enum ischia_code create_parts(struct daemon *d, struct ischia_error *err)
     TRY(auth_create(&s->auth, s->store, err));
     TRY(audit_create(&s->audit, s->store, err));
     TRY(rate_create(&s->rate, err));
-    if (s->config.emulator[0] != '\0')
-        TRY(estimator_create(&s->estimator, s->config.emulator, err));
+    TRY(load_emulator(d, err));
     if (s->config.cds_issuers[0] != '\0') TRY(trust_create(&s->trust, s->config.cds_issuers, err));
     return documents_create(&s->documents, err);
 }
@@ -354,7 +374,9 @@ static void on_store_error(void *context, const struct ischia_error *err)
 static enum ischia_code start_queue(struct daemon *d, struct ischia_error *err)
 {
     const struct config *config = &d->service.config;
-    const char *const command[] = {d->worker_program, "worker", NULL};
+    const bool emulates = d->emulator[0] != '\0';
+    const char *const command[] = {d->worker_program, "worker", emulates ? "--emulator" : NULL,
+                                   d->emulator, NULL};
     const struct queue_options options = {
         .pool = {.command = command,
                  .solve_workers = config->workers,

@@ -38,4 +38,13 @@ def runs():
         )
 
 
-RUNS = tuple(runs())
+# What the emulator is trained with beside table1_default; sobol_default has no part in that.
+TRAINING = tuple(
+    Run(f"{name}_default", title, ("study", "factorial", f"examples/design_{name}.json"))
+    for name, title in (
+        ("training", "1024 points between those of Table 1, for the emulator"),
+        ("training_wide", "1024 points in a wider box, for the emulator"),
+    )
+)
+
+RUNS = (*runs(), *TRAINING)

@@ -105,13 +105,18 @@ static bool draw_progress(void *context, const struct ischia_progress *progress)
     return true;
 }
 
+struct ischia_observer observe_with_bar(struct bar *bar)
+{
+    bar_init(bar);
+    return (struct ischia_observer){.on_progress = draw_progress, .context = bar};
+}
+
 enum ischia_code solve_with_bar(const struct ischia_case *c, struct ischia_result *ret_result,
                                 struct ischia_field *ret_field, struct ischia_error *err)
 {
     struct ischia_solver *solver;
     struct bar bar;
-    const struct ischia_observer observer = {.on_progress = draw_progress, .context = &bar};
-    bar_init(&bar);
+    const struct ischia_observer observer = observe_with_bar(&bar);
     TRY(ischia_solver_create(&solver, err));
     const enum ischia_code code = timed_solve(solver, c, &observer, ret_result, ret_field, err);
     ischia_solver_destroy(solver);

@@ -3,6 +3,7 @@
 #define ISCHIA_SERVER_CLI_RUN_H
 
 #include "api/case_doc.h"
+#include "server/cli/bar.h"
 #include "server/cli/command.h"
 #include "solver/solver.h"
 
@@ -28,6 +29,9 @@ timed_solve(struct ischia_solver *solver, const struct ischia_case *c,
 ISCHIA_MUST_CHECK enum ischia_code
 solve_with_bar(const struct ischia_case *c, struct ischia_result *ret_result,
                struct ischia_field *ret_field, struct ischia_error *err);
+
+/* A bar on a terminal, as an observer; bar_clear it at the end. */
+struct ischia_observer observe_with_bar(struct bar *bar);
 
 /* One of the writers of solver.h, into a file that appears when it is complete. field may be NULL
  * for a writer that does not need one. */

@@ -9,17 +9,19 @@
 #include "server/cli/run.h"
 #include "server/cli/section_words.h"
 #include "server/cli/summary.h"
+#include "server/cli/uncertain.h"
 
 struct solve_options {
-    const char *vtu, *svg, *resolution;
+    const char *vtu, *svg, *resolution, *emulator;
     bool summary;
 };
 
-static enum ischia_code print_json(const struct ischia_case *c, const struct ischia_result *result,
+static enum ischia_code print_json(const struct ischia_case *c,
+                                   const struct uncertain_solution *solved,
                                    struct ischia_error *err)
 {
     char *text;
-    TRY(result_doc_text(&text, c, result, 2, err));
+    TRY(result_doc_text(&text, c, &solved->result, uncertain_of(solved), 2, err));
     const int printed = printf("%s\n", text);
     free(text);
     CHECK(printed >= 0 && fflush(stdout) == 0, err, ISCHIA_E_IO, "cannot write standard output: %s",
@@ -27,12 +29,12 @@ static enum ischia_code print_json(const struct ischia_case *c, const struct isc
     return ISCHIA_OK;
 }
 
-static enum ischia_code print_result(const struct solve_options *options,
-                                     const struct ischia_request *request,
-                                     const struct ischia_result *result, struct ischia_error *err)
+static enum ischia_code
+print_result(const struct solve_options *options, const struct ischia_request *request,
+             const struct uncertain_solution *solved, struct ischia_error *err)
 {
-    if (!options->summary) return print_json(&request->values, result, err);
-    summary_print(stdout, request, result);
+    if (!options->summary) return print_json(&request->values, solved, err);
+    summary_print(stdout, request, &solved->result, uncertain_of(solved));
     CHECK(fflush(stdout) == 0 && !ferror(stdout), err, ISCHIA_E_IO,
           "cannot write standard output: %s", strerror(errno));
     return ISCHIA_OK;
@@ -47,18 +49,46 @@ static enum ischia_code write_fields(const struct solve_options *options,
     return ISCHIA_OK;
 }
 
+/* The emulator that was named, else the one that came with the program, if there is one. It is
+ * only read when the inputs are uncertain. */
+static enum ischia_code load_emulator(const struct solve_options *options,
+                                      const struct ischia_request *request, struct estimator **ret,
+                                      struct ischia_error *err)
+{
+    char path[ESTIMATOR_PATH_BYTES];
+    if (!request->has_sd) return ISCHIA_OK;
+    if (options->emulator != NULL) return estimator_create(ret, options->emulator, err);
+    return estimator_installed(path) ? estimator_create(ret, path, err) : ISCHIA_OK;
+}
+
+static enum ischia_code compute(const struct solve_options *options,
+                                const struct ischia_request *request,
+                                struct uncertain_solution *ret, struct ischia_error *err)
+{
+    struct ischia_solver *solver = NULL;
+    struct estimator *estimator = NULL;
+    struct bar bar;
+    const struct ischia_observer observer = observe_with_bar(&bar);
+    enum ischia_code code = load_emulator(options, request, &estimator, err);
+    if (code == ISCHIA_OK) code = ischia_solver_create(&solver, err);
+    if (code == ISCHIA_OK) code = uncertain_solve(solver, estimator, request, &observer, ret, err);
+    ischia_solver_destroy(solver);
+    estimator_destroy(estimator);
+    bar_clear(&bar);
+    return code;
+}
+
 static int solve(const struct solve_options *options, const struct ischia_request *request)
 {
-    struct ischia_result result;
-    struct ischia_field field;
+    struct uncertain_solution solved;
     struct ischia_error err;
     const struct ischia_case *c = &request->values;
-    if (solve_with_bar(c, &result, &field, &err) != ISCHIA_OK) return report_error("solve", &err);
-    const bool converged = ischia_result_converged(&result);
-    enum ischia_code code = print_result(options, request, &result, &err);
-    if (code == ISCHIA_OK && converged) code = write_fields(options, c, &field, &err);
-    ischia_field_finish(&field);
-    if (!converged) report_divergence("solve", c, &result);
+    if (compute(options, request, &solved, &err) != ISCHIA_OK) return report_error("solve", &err);
+    const bool converged = ischia_result_converged(&solved.result);
+    enum ischia_code code = print_result(options, request, &solved, &err);
+    if (code == ISCHIA_OK && converged) code = write_fields(options, c, &solved.field, &err);
+    ischia_field_finish(&solved.field);
+    if (!converged) report_divergence("solve", c, &solved.result);
     if (code != ISCHIA_OK) return report_error("solve", &err);
     return converged ? EXIT_DONE : EXIT_SOLVE_FAILED;
 }
@@ -69,6 +99,8 @@ int command_solve(int argc, char **argv)
     const struct cli_option table[] = {
         {"--resolution", 0, "NAME", "standard, fine or coarse, instead of the case's own",
          &options.resolution, NULL},
+        {"--emulator", 0, "FILE", "a trained emulator instead of the installed one, for \"sd\"",
+         &options.emulator, NULL},
         {"--vtu", 0, "OUT", "also write the deformed model for ParaView", &options.vtu, NULL},
         {"--svg", 0, "OUT", "also draw the symmetry section", &options.svg, NULL},
         {"--summary", 0, NULL, "print a summary with units instead of JSON", NULL,
@@ -80,7 +112,9 @@ int command_solve(int argc, char **argv)
         .synopsis = "[FILE|-]",
         .about = "Solves one side. FILE is a JSON object with R1, R2, eM, eF, muM, muF and F\n"
                  "(standard input when it is - or left out). The result object goes to standard\n"
-                 "output; a result that did not converge has null for what is not known.",
+                 "output; a result that did not converge has null for what is not known. With "
+                 "\"sd\" (an\n"
+                 "object of standard deviations, or \"typical\") it says how uncertain it is.",
         .options = table,
         .operands_max = 1,
     };

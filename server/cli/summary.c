@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "api/risk.h"
+#include "api/uncertainty_doc.h"
 
 static void print_inputs(FILE *out, const struct ischia_request *request)
 {
@@ -87,14 +88,58 @@ static void print_numerics(FILE *out, const struct ischia_case *c, const struct 
                       n->last_converged_F_N, c->param[ISCHIA_F], n->detail);
 }
 
+static void print_interval(FILE *out, const char *head, const char *name, const char *unit,
+                           int decimals, const double quantile[UNCERTAINTY_QUANTILES])
+{
+    if (isnan(quantile[0])) return;
+    (void)fprintf(out, "%-11s %-12s %.*f, ", head, name, decimals, quantile[2]);
+    if (isnan(quantile[UNCERTAINTY_QUANTILES - 1]))
+        (void)fprintf(out, "%.*f%s or more\n", decimals, quantile[0], unit);
+    else
+        (void)fprintf(out, "%.*f to %.*f%s\n", decimals, quantile[0], decimals,
+                      quantile[UNCERTAINTY_QUANTILES - 1], unit);
+}
+
+static void print_sources(FILE *out, const struct ischia_uncertainty *u)
+{
+    enum ischia_param order[ISCHIA_PARAM_COUNT];
+    const int count = uncertainty_order(u, order);
+    if (count == 0) return;
+    (void)fprintf(out, "            spread of eps_max from");
+    for (int i = 0; i < count; i++)
+        (void)fprintf(out, "%s %s %.0f %%", i > 0 ? "," : "", ischia_params[order[i]].key,
+                      100 * u->total[order[i]]);
+    (void)fprintf(out, "\n");
+}
+
+/* Medians, and between which two numbers nine samples in ten lie. */
+static void print_uncertainty(FILE *out, const struct ischia_uncertainty *u)
+{
+    if (u->status != UNCERTAINTY_GIVEN) {
+        (void)fprintf(out, "Uncertainty none given: %s\n", uncertainty_status_names[u->status]);
+        return;
+    }
+    print_interval(out, "Uncertainty", "eps_max", "", 3, u->quantile[UNCERTAIN_EPS_MAX]);
+    print_interval(out, "(median and", "shear", " mm³", 0, u->quantile[UNCERTAIN_VOLUME_SHEAR]);
+    print_interval(out, "5 to 95 %)", "compression", " mm³", 0,
+                   u->quantile[UNCERTAIN_VOLUME_COMPRESSION]);
+    (void)fprintf(out,
+                  "            samples over the threshold: shear %.0f %%, compression %.0f %%\n",
+                  100 * u->share_shear, 100 * u->share_compression);
+    print_sources(out, u);
+    (void)fprintf(out, "            beside it: error of the model's form, %.3f in eps_max\n",
+                  ISCHIA_MODEL_FORM_EPS_MAX);
+}
+
 void summary_print(FILE *out, const struct ischia_request *request,
-                   const struct ischia_result *result)
+                   const struct ischia_result *result, const struct ischia_uncertainty *uncertainty)
 {
     print_inputs(out, request);
     if (ischia_result_converged(result)) {
         print_strain(out, result);
         print_volumes(out, result);
         print_seat(out, &result->seat);
+        if (uncertainty != NULL) print_uncertainty(out, uncertainty);
         print_risk(out, &request->values, result);
     }
     print_numerics(out, &request->values, &result->numerics);

@@ -6,10 +6,12 @@
 
 #include "api/case_doc.h"
 #include "solver/result.h"
+#include "solver/study/uncertainty.h"
 
 /* A result for people: values with their units and strain measures, one thing a line. Of a result
  * that did not converge only the inputs and how far it came. */
 void summary_print(FILE *out, const struct ischia_request *request,
-                   const struct ischia_result *result);
+                   const struct ischia_result *result,
+                   const struct ischia_uncertainty *uncertainty);
 
 #endif

@@ -15,6 +15,7 @@
 #include "server/cli/options.h"
 #include "server/cli/run.h"
 #include "server/cli/section_words.h"
+#include "server/cli/uncertain.h"
 #include "server/cli/version.h"
 #include "server/cli/worker_sandbox.h"
 #include "server/frame.h"
@@ -37,6 +38,7 @@ enum { SHUT_IN = 1 };
 struct worker {
     int fd;
     struct ischia_solver *solver;
+    struct estimator *estimator; /* NULL: there is no emulator */
     struct frame_reader reader;
     struct frame_writer writer;
     int job;             /* being worked on */
@@ -139,13 +141,13 @@ struct solution {
     size_t blob_size;
 };
 
-static enum ischia_code
-write_solution(const struct ischia_case *c, const struct ischia_result *result,
-               const struct ischia_field *field, struct solution *ret, struct ischia_error *err)
+static enum ischia_code write_solution(const struct ischia_case *c,
+                                       const struct uncertain_solution *solved,
+                                       struct solution *ret, struct ischia_error *err)
 {
-    TRY(field_blob_encode(field->displacement_mm, field->node_count, &ret->blob, &ret->blob_size,
-                          err));
-    return result_doc_text(&ret->text, c, result, 0, err);
+    TRY(field_blob_encode(solved->field.displacement_mm, solved->field.node_count, &ret->blob,
+                          &ret->blob_size, err));
+    return result_doc_text(&ret->text, c, &solved->result, uncertain_of(solved), 0, err);
 }
 
 static enum ischia_code say_solution(struct worker *worker, const struct solution *solution,
@@ -159,17 +161,17 @@ static enum ischia_code say_solution(struct worker *worker, const struct solutio
 }
 
 static enum ischia_code say_solved(struct worker *worker, const struct ischia_case *c,
-                                   const struct ischia_result *result,
-                                   const struct ischia_field *field, struct ischia_error *err)
+                                   const struct uncertain_solution *solved,
+                                   struct ischia_error *err)
 {
-    if (!ischia_result_converged(result)) {
+    if (!ischia_result_converged(&solved->result)) {
         struct problem problem;
-        problem_from_result(&problem, c, result);
+        problem_from_result(&problem, c, &solved->result);
         return say_problem(worker, &problem, err);
     }
     struct solution solution = {0};
     struct ischia_error why = {0};
-    const bool written = write_solution(c, result, field, &solution, &why) == ISCHIA_OK;
+    const bool written = write_solution(c, solved, &solution, &why) == ISCHIA_OK;
     const enum ischia_code code =
         written ? say_solution(worker, &solution, err) : say_error(worker, &why, err);
     free(solution.text);
@@ -177,19 +179,19 @@ static enum ischia_code say_solved(struct worker *worker, const struct ischia_ca
     return code;
 }
 
-static enum ischia_code solve(struct worker *worker, const struct ischia_case *c,
+static enum ischia_code solve(struct worker *worker, const struct ischia_request *request,
                               struct ischia_error *err)
 {
     const struct ischia_observer observer = {.on_progress = on_progress, .context = worker};
-    struct ischia_result result;
-    struct ischia_field field = {0};
+    struct uncertain_solution solved;
     struct ischia_error why = {0};
-    if (timed_solve(worker->solver, c, &observer, &result, &field, &why) != ISCHIA_OK) {
+    if (uncertain_solve(worker->solver, worker->estimator, request, &observer, &solved, &why) !=
+        ISCHIA_OK) {
         CHECK(!worker->daemon_is_gone, err, ISCHIA_E_IO, "the daemon is gone");
         return say_error(worker, &why, err);
     }
-    const enum ischia_code code = say_solved(worker, c, &result, &field, err);
-    ischia_field_finish(&field);
+    const enum ischia_code code = say_solved(worker, &request->values, &solved, err);
+    ischia_field_finish(&solved.field);
     return code;
 }
 
@@ -293,7 +295,7 @@ static enum ischia_code do_order(struct worker *worker, const struct message *or
     }
     worker->said_at_ms = 0;
     if (order->kind == MESSAGE_RENDER) return render(worker, order, &request.values, blob, err);
-    return solve(worker, &request.values, err);
+    return solve(worker, &request, err);
 }
 
 static enum ischia_code take_order(struct worker *worker, const struct message *order,
@@ -327,8 +329,10 @@ static enum ischia_code serve(struct worker *worker, struct ischia_error *err)
     }
 }
 
-static enum ischia_code run(struct worker *worker, struct ischia_error *err)
+/* What needs files comes before the worker is shut in. */
+static enum ischia_code run(struct worker *worker, const char *emulator, struct ischia_error *err)
 {
+    if (emulator != NULL) TRY(estimator_create(&worker->estimator, emulator, err));
     TRY(ischia_solver_create(&worker->solver, err));
     if (SHUT_IN) TRY(worker_sandbox_enter(worker->fd, err));
     TRY(say_hello(worker, err));
@@ -337,12 +341,14 @@ static enum ischia_code run(struct worker *worker, struct ischia_error *err)
 
 int command_worker(int argc, char **argv)
 {
-    const char *fd_text = NULL;
+    const char *fd_text = NULL, *emulator = NULL;
     const struct cli_option options[] = {
-        {"--fd", 0, "N", "the descriptor of the socket to ischiad", &fd_text, NULL}, {0}};
+        {"--fd", 0, "N", "the descriptor of the socket to ischiad", &fd_text, NULL},
+        {"--emulator", 0, "FILE", "a trained emulator, for uncertain inputs", &emulator, NULL},
+        {0}};
     const struct cli_usage usage = {
         .command = "worker",
-        .synopsis = "--fd N",
+        .synopsis = "--fd N [--emulator FILE]",
         .about = "Solves and draws for ischiad, which starts it. Not for use by hand.",
         .options = options,
         .operands_max = 0,
@@ -357,8 +363,9 @@ int command_worker(int argc, char **argv)
     if (!cli_whole_number(&usage, "--fd", fd_text, 0, FD_MAX, &worker.fd)) return EXIT_BAD_INPUT;
     struct ischia_error err = {0};
     frame_reader_init(&worker.reader, &frame_limits_default);
-    const enum ischia_code code = run(&worker, &err);
+    const enum ischia_code code = run(&worker, emulator, &err);
     ischia_solver_destroy(worker.solver);
+    estimator_destroy(worker.estimator);
     frame_reader_finish(&worker.reader);
     frame_writer_finish(&worker.writer);
     if (code != ISCHIA_OK) return (int)report_error("worker", &err);

@@ -1,148 +1,44 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "api/case_doc.h"
-#include "api/case_words.h"
 #include "api/json.h"
 #include "api/problem_doc.h"
+#include "server/http/estimate_doc.h"
+#include "server/http/query.h"
 #include "server/http/reply.h"
 #include "server/http/routes.h"
 
 /*
- * An estimate of one side by the trained emulator, in the request: no queue, no worker, nothing
- * stored. Where the emulator knows nothing (outside its training, other options) it says so and
- * gives no numbers.
+ * Estimates of one side by the trained emulator, in the request: no queue, no worker, nothing
+ * stored. And what they would be were one of its numbers another: which force a cushion aims at.
+ * Where the emulator knows nothing (outside its training, other options) it says so and gives no
+ * numbers.
  */
 
-static const double no_limit = 1e300;
+/* ------------------------------------------------------------------------------ an estimate */
 
-/* The members of the document, in their order: "group" or "group.part", key, response. */
-static const struct shown {
-    const char *group, *part, *key, *response;
-    double ceiling; /* no value is above it */
-    bool crossing;  /* a force at which a threshold is crossed: null beyond the case's own force */
-} shown[] = {
-    {"strain", NULL, "eps_max", "eps_max", no_limit, false},
-    {"strain", NULL, "E_shear_max", "E_shear_max", no_limit, false},
-    {"strain", NULL, "E_comp_max", "E_comp_max", 0.5, false},
-    {"clusters", "shear", "volume_mm3", "volume_shear_mm3", no_limit, false},
-    {"clusters", "compression", "volume_mm3", "volume_compression_mm3", no_limit, false},
-    {"clusters", "both", "volume_mm3", "volume_both_mm3", no_limit, false},
-    {"seat", NULL, "displacement_mm", "seat_displacement_mm", no_limit, false},
-    {"threshold_force_N", NULL, "shear", "force_shear_N", no_limit, true},
-    {"threshold_force_N", NULL, "compression", "force_compression_N", no_limit, true},
-};
-enum { SHOWN_COUNT = sizeof shown / sizeof shown[0] };
-
-/* -------------------------------------------------------------------------------- values */
-
-static const struct predictor_output *output_for(const struct predictor *p, const char *response)
+static void send_document(struct call *call, struct json_out *out, struct http_response *ret)
 {
-    for (int o = 0; o < p->output_count; o++)
-        if (strcmp(p->output[o].name, response) == 0) return &p->output[o];
-    return NULL;
+    struct ischia_error err;
+    char *text = NULL;
+    size_t size = 0;
+    http_header_static(ret, "Cache-Control", "no-store");
+    if (json_out_take(out, &text, &size, &err) == ISCHIA_OK)
+        http_body(ret, "application/json", text, size);
+    else
+        reply_failure(call->request, ret, &err);
 }
 
-static double at_most(double value, double ceiling) { return value < ceiling ? value : ceiling; }
-
-static void write_value(struct json_out *out, const struct shown *s, const struct predictor *p,
-                        const struct predictor_point *point, double F_N)
+static void begin_document(struct json_out *out, const char *kind, const struct ischia_case *c)
 {
-    const struct predictor_output *output = output_for(p, s->response);
-    struct predictor_estimate e = {0};
-    if (output != NULL) e = predictor_estimate_of(output, point);
-    if (output == NULL || (s->crossing && e.value > F_N)) {
-        json_put_null(out, s->key);
-        return;
-    }
-    json_open_object(out, s->key);
-    json_put_number(out, "value", at_most(e.value, s->ceiling));
-    json_put_number(out, "low", at_most(e.low, s->ceiling));
-    json_put_number(out, "high", at_most(e.high, s->ceiling));
-    json_close_object(out);
-}
-
-/* point: NULL when there is nothing to say; every group is then null. */
-static void write_values(struct json_out *out, const struct predictor *p,
-                         const struct predictor_point *point, double F_N)
-{
-    for (int i = 0; i < SHOWN_COUNT; i++) {
-        const bool begins = i == 0 || strcmp(shown[i - 1].group, shown[i].group) != 0;
-        const bool ends = i + 1 == SHOWN_COUNT || strcmp(shown[i + 1].group, shown[i].group) != 0;
-        if (point == NULL) {
-            if (begins) json_put_null(out, shown[i].group);
-            continue;
-        }
-        if (begins) json_open_object(out, shown[i].group);
-        if (shown[i].part != NULL) json_open_object(out, shown[i].part);
-        write_value(out, &shown[i], p, point, F_N);
-        if (shown[i].part != NULL) json_close_object(out);
-        if (ends) json_close_object(out);
-    }
-}
-
-/* ------------------------------------------------------------------------------ warnings */
-
-static void write_warning(struct json_out *out, const char *code, const char *pointer,
-                          const char *detail)
-{
+    json_out_init(out, 0);
     json_open_object(out, NULL);
-    json_put_string(out, "code", code);
-    json_put_string(out, "pointer", pointer);
-    json_put_string(out, "detail", detail);
-    json_close_object(out);
-}
-
-static void warn_of_input(struct json_out *out, const struct predictor *p,
-                          const struct ischia_case *c, enum ischia_param i)
-{
-    const struct ischia_param_info *info = &ischia_params[i];
-    char pointer[16], detail[160];
-    if (predictor_covers(p, c, i)) return;
-    (void)snprintf(pointer, sizeof pointer, "/%s", info->key);
-    (void)snprintf(detail, sizeof detail,
-                   "%s is %.6g %s; the emulator was trained for %.6g to %.6g %s: no estimate",
-                   info->key, c->param[i], info->unit, p->input[i].min, p->input[i].max,
-                   info->unit);
-    write_warning(out, "outside_training", pointer, detail);
-}
-
-static void write_warnings(struct json_out *out, const struct predictor *p,
-                           const struct ischia_case *c, enum language language)
-{
-    struct ischia_fault outside[ISCHIA_PARAM_COUNT];
-    const size_t count = case_warnings(c, language, outside);
-    json_open_array(out, "warnings");
-    for (size_t i = 0; i < count; i++)
-        write_warning(out, outside[i].code, outside[i].pointer, outside[i].detail);
-    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) warn_of_input(out, p, c, (enum ischia_param)i);
-    if (!predictor_same_options(p, c))
-        write_warning(out, "other_model", "/model",
-                      "the emulator was trained with other options of model or skin: no estimate");
-    if (p->trial)
-        write_warning(out, "trial_emulator", "",
-                      "this emulator was made for trying out: do not rely on its numbers");
-    json_close_array(out);
-}
-
-/* ------------------------------------------------------------------------------ the whole */
-
-static bool covers_all(const struct predictor *p, const struct ischia_case *c)
-{
-    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
-        if (!predictor_covers(p, c, (enum ischia_param)i)) return false;
-    return predictor_same_options(p, c);
-}
-
-static void write_emulator(struct json_out *out, const struct estimator *estimator)
-{
-    const struct predictor *p = &estimator->predictor;
-    json_open_object(out, "emulator");
-    json_put_integer(out, "rows", p->rows);
-    json_put_string(out, "resolution", ischia_resolution_names[p->resolution]);
-    json_put_bool(out, "trial", p->trial);
-    json_put_string(out, "sha256", estimator->digest);
+    json_put_string(out, "kind", kind);
+    json_open_object(out, "parameters");
+    case_doc_write_parameters(out, c);
     json_close_object(out);
 }
 
@@ -150,31 +46,20 @@ static void send_estimate(struct call *call, const struct ischia_case *c, struct
 {
     const struct estimator *estimator = call->service->estimator;
     const struct predictor *p = &estimator->predictor;
-    const bool known = covers_all(p, c);
-    struct predictor_point point;
+    const bool known = predictor_knows(p, c);
     struct json_out out;
-    struct ischia_error err;
-    char *text = NULL;
-    size_t size = 0;
-    if (known) point = predictor_point_of(p, c);
-    json_out_init(&out, 0);
-    json_open_object(&out, NULL);
-    json_put_string(&out, "kind", "estimate");
-    json_open_object(&out, "parameters");
-    case_doc_write_parameters(&out, c);
+    begin_document(&out, "estimate", c);
+    estimate_put_values(&out, p, known ? c : NULL);
+    estimate_put_emulator(&out, estimator);
+    estimate_put_warnings(&out, p, c, reply_language(call->request));
     json_close_object(&out);
-    write_values(&out, p, known ? &point : NULL, c->param[ISCHIA_F]);
-    write_emulator(&out, estimator);
-    write_warnings(&out, p, c, reply_language(call->request));
-    json_close_object(&out);
-    http_header_static(ret, "Cache-Control", "no-store");
-    if (json_out_take(&out, &text, &size, &err) == ISCHIA_OK)
-        http_body(ret, "application/json", text, size);
-    else
-        reply_failure(call->request, ret, &err);
+    send_document(call, &out, ret);
 }
 
-void handle_estimate(struct call *call, struct http_response *ret)
+/* Who asks gets an estimate, or is told what is wrong. */
+typedef void answerer(struct call *call, const struct ischia_case *c, struct http_response *ret);
+
+static void answer(struct call *call, struct http_response *ret, answerer *give)
 {
     struct ischia_request request;
     struct doc_faults faults;
@@ -184,7 +69,7 @@ void handle_estimate(struct call *call, struct http_response *ret)
     if (call->service->estimator == NULL) {
         reply_refusal_english(
             http, ret, PROBLEM_NOT_FOUND,
-            "No trained emulator is installed here (option emulator), so there are no "
+            "No trained emulator is in use here (option emulator), so there are no "
             "estimates; an assessment is always solved.");
         return;
     }
@@ -193,7 +78,7 @@ void handle_estimate(struct call *call, struct http_response *ret)
     const enum ischia_code code =
         case_doc_read(&request, http->body, http->body_size, &json_limits_request, &faults, &err);
     if (code == ISCHIA_OK && faults.count == 0) {
-        send_estimate(call, &request.values, ret);
+        give(call, &request.values, ret);
         return;
     }
     if (code != ISCHIA_OK)
@@ -202,3 +87,106 @@ void handle_estimate(struct call *call, struct http_response *ret)
         problem_from_faults(&problem, &faults);
     reply_problem(http, &problem, ret);
 }
+
+void handle_estimate(struct call *call, struct http_response *ret)
+{
+    answer(call, ret, send_estimate);
+}
+
+/* --------------------------------------------------------------------------------- what if */
+
+enum { POINTS_DEFAULT = 41, POINTS_MIN = 2, POINTS_MAX = 201 };
+
+struct sweep {
+    enum ischia_param input;
+    double from, to;
+    int points;
+};
+
+static bool find_input(const char *key, enum ischia_param *ret)
+{
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
+        if (strcmp(key, ischia_params[i].key) != 0) continue;
+        *ret = (enum ischia_param)i;
+        return true;
+    }
+    return false;
+}
+
+/* "?parameter=F&points=41"; false when one of them makes no sense. */
+static bool read_query(const struct call *call, struct sweep *ret)
+{
+    char key[16], count[8];
+    long long points = POINTS_DEFAULT;
+    const char *query = call->request->query;
+    const enum query_answer has_key = query_find(query, "parameter", key, sizeof key);
+    const enum query_answer has_count = query_find(query, "points", count, sizeof count);
+    ret->input = ISCHIA_F;
+    if (has_key == QUERY_BAD || has_count == QUERY_BAD) return false;
+    if (has_key == QUERY_FOUND && !find_input(key, &ret->input)) return false;
+    if (has_count == QUERY_FOUND && !query_whole_number(count, POINTS_MIN, POINTS_MAX, &points))
+        return false;
+    ret->points = (int)points;
+    return true;
+}
+
+/* Over the training box, and no further than where the case would not be valid any more. */
+static void bound_sweep(const struct predictor *p, const struct ischia_case *c, struct sweep *sweep)
+{
+    sweep->from = p->input[sweep->input].min;
+    sweep->to = p->input[sweep->input].max;
+    if (sweep->input == ISCHIA_R2) sweep->from = fmax(sweep->from, c->param[ISCHIA_R1]);
+    if (sweep->input == ISCHIA_R1) sweep->to = fmin(sweep->to, c->param[ISCHIA_R2]);
+}
+
+static double sweep_value(const struct sweep *sweep, int k)
+{
+    if (k + 1 == sweep->points) return sweep->to; /* not a rounding beyond it */
+    return sweep->from + (sweep->to - sweep->from) * k / (sweep->points - 1);
+}
+
+static void put_points(struct json_out *out, const struct predictor *p, const struct ischia_case *c,
+                       const struct sweep *sweep)
+{
+    json_open_array(out, "points");
+    for (int k = 0; k < sweep->points; k++) {
+        struct ischia_case at = *c;
+        at.param[sweep->input] = sweep_value(sweep, k);
+        if (!predictor_knows(p, &at)) continue; /* another input is outside: no point is inside */
+        json_open_object(out, NULL);
+        json_put_number(out, "at", at.param[sweep->input]);
+        estimate_put_values(out, p, &at);
+        estimate_put_margins(out, "margin", p, &at);
+        json_close_object(out);
+    }
+    json_close_array(out);
+}
+
+static void send_sweep(struct call *call, const struct ischia_case *c, struct http_response *ret)
+{
+    const struct estimator *estimator = call->service->estimator;
+    const struct predictor *p = &estimator->predictor;
+    struct sweep sweep;
+    struct json_out out;
+    if (!read_query(call, &sweep)) {
+        reply_refusal_english(call->request, ret, PROBLEM_BAD_REQUEST,
+                              "parameter is one of R1, R2, eM, eF, muM, muF, F, and points a "
+                              "whole number from 2 to 201");
+        return;
+    }
+    bound_sweep(p, c, &sweep);
+    begin_document(&out, "what_if", c);
+    json_put_string(&out, "parameter", ischia_params[sweep.input].key);
+    json_put_string(&out, "unit", ischia_params[sweep.input].unit);
+    put_points(&out, p, c, &sweep);
+    if (predictor_knows(p, c))
+        estimate_put_forces(&out, "target_force_N", p, c);
+    else
+        json_put_null(&out, "target_force_N");
+    estimate_put_emulator(&out, estimator);
+    estimate_put_warnings(&out, p, c, reply_language(call->request));
+    json_close_object(&out);
+    send_document(call, &out, ret);
+}
+
+void handle_what_if(struct call *call, struct http_response *ret) { answer(call, ret, send_sweep); }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
 #include <string.h>
 
 #include "api/case_doc.h"
@@ -7,6 +8,7 @@
 #include "api/problem_doc.h"
 #include "api/result_csv.h"
 #include "api/result_doc.h"
+#include "api/uncertainty_doc.h"
 #include "server/http/query.h"
 #include "server/http/reply.h"
 #include "server/http/routes.h"
@@ -161,6 +163,15 @@ static const char *const csv_head[] = {"id",   "created_at", "finished_at", "sub
                                        "side", "label",      "measured_at", "resolution"};
 enum { CSV_HEAD_COUNT = sizeof csv_head / sizeof csv_head[0] };
 
+/* After the columns of a cohort: what nine samples in ten lie between; empty when unknown. */
+static const struct {
+    const char *name;
+    int quantile;
+} csv_intervals[] = {{"eps_max_q05", 0},
+                     {"eps_max_q50", UNCERTAINTY_QUANTILES / 2},
+                     {"eps_max_q95", UNCERTAINTY_QUANTILES - 1}};
+enum { CSV_INTERVAL_COUNT = sizeof csv_intervals / sizeof csv_intervals[0] };
+
 struct csv_page {
     struct text_out out;
     enum ischia_code code;
@@ -172,6 +183,7 @@ static void put_csv_header(struct text_out *out)
     for (int i = 0; i < CSV_HEAD_COUNT; i++) csv_put_text(out, csv_head[i], i == 0);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) csv_put_text(out, ischia_params[i].key, false);
     result_csv_put_header(out, false);
+    for (int i = 0; i < CSV_INTERVAL_COUNT; i++) csv_put_text(out, csv_intervals[i].name, false);
     csv_end_row(out);
 }
 
@@ -197,6 +209,23 @@ static void put_csv_result(struct csv_page *page, const struct store_assessment 
     result_csv_put(&page->out, queue_state_names[row->state], problem.detail, shown, false);
 }
 
+static void put_csv_interval(struct csv_page *page, const struct store_assessment *row)
+{
+    struct ischia_uncertainty u;
+    bool present = false;
+    if (row->result_json != NULL && page->code == ISCHIA_OK)
+        page->code = uncertainty_doc_read(&u, &present, row->result_json, strlen(row->result_json),
+                                          &page->err);
+    for (int i = 0; i < CSV_INTERVAL_COUNT; i++) {
+        const double value =
+            present ? u.quantile[UNCERTAIN_EPS_MAX][csv_intervals[i].quantile] : (double)NAN;
+        if (isnan(value))
+            csv_put_text(&page->out, "", false);
+        else
+            csv_put_number(&page->out, value, false);
+    }
+}
+
 static bool write_csv_row(void *context, const struct store_assessment *row)
 {
     struct csv_page *page = context;
@@ -219,6 +248,7 @@ static bool write_csv_row(void *context, const struct store_assessment *row)
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
         csv_put_number(&page->out, request.values.param[i], false);
     put_csv_result(page, row);
+    put_csv_interval(page, row);
     csv_end_row(&page->out);
     return page->code == ISCHIA_OK;
 }

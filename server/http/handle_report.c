@@ -9,6 +9,7 @@
 #include "api/problem_doc.h"
 #include "api/result_doc.h"
 #include "api/risk.h"
+#include "api/uncertainty_doc.h"
 #include "server/http/page.h"
 #include "server/http/query.h"
 #include "server/http/reply.h"
@@ -242,6 +243,149 @@ static void put_clusters(const struct report *r, const struct ischia_case *c,
     end_table(r);
 }
 
+/* ---------------------------------------------------------------------- uncertainty */
+
+static const char *not_reached_or(const struct report *r, double number, int decimals,
+                                  char text[WORDS_NUMBER_BYTES])
+{
+    if (isnan(number)) return say(r, WORD_NUMBERS_NEVER);
+    return words_fixed(text, r->language, number, decimals);
+}
+
+static void put_interval(const struct report *r, enum word name, const char *unit, int decimals,
+                         const double quantile[UNCERTAINTY_QUANTILES])
+{
+    static const int shown[] = {2, 0, UNCERTAINTY_QUANTILES - 1}; /* median, 5 %, 95 % */
+    char text[WORDS_NUMBER_BYTES];
+    if (isnan(quantile[0])) return;
+    begin_row(r, say(r, name));
+    for (size_t i = 0; i < sizeof shown / sizeof shown[0]; i++)
+        put_number(r, not_reached_or(r, quantile[shown[i]], decimals, text));
+    put_text(r, unit);
+    end_row(r);
+}
+
+static void put_interval_head(const struct report *r)
+{
+    static const char *const columns[] = {"50\u202f%", "5\u202f%", "95\u202f%", ""};
+    page_put(r->out, "<thead><tr>");
+    put_column(r, "", "");
+    for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++)
+        put_column(r, " class=\"n\"", columns[i]);
+    page_put(r->out, "</tr></thead>\n");
+}
+
+static void put_intervals(const struct report *r, const struct ischia_uncertainty *u)
+{
+    static const struct {
+        enum word name;
+        const char *unit;
+        int decimals;
+        enum uncertain_quantity quantity;
+    } rows[] = {
+        {WORD_CURVE_COL_EPS, "", 3, UNCERTAIN_EPS_MAX},
+        {WORD_NUMBERS_V_SHEAR, "mm\u00b3", 0, UNCERTAIN_VOLUME_SHEAR},
+        {WORD_NUMBERS_V_COMP, "mm\u00b3", 0, UNCERTAIN_VOLUME_COMPRESSION},
+        {WORD_NUMBERS_F_SHEAR, "N", 0, UNCERTAIN_FORCE_SHEAR},
+    };
+    char caption[160];
+    page_put(r->out, "<table>\n<caption>");
+    page_escape(r->out,
+                words_fill(caption, sizeof caption, r->language, WORD_DAEMON_UNCERTAIN_REPORT,
+                           WORDS(word_count("n", u->samples))));
+    page_put(r->out, "</caption>\n");
+    put_interval_head(r);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        put_interval(r, rows[i].name, rows[i].unit, rows[i].decimals,
+                     u->quantile[rows[i].quantity]);
+    end_table(r);
+}
+
+/* Inputs by name, with a percentage each: a share of the spread, or of the samples outside. */
+static const char *list_inputs(const struct report *r, const double *share, double least,
+                               char *text, size_t size)
+{
+    size_t used = 0;
+    text[0] = '\0';
+    for (int i = 0; i < ISCHIA_PARAM_COUNT && used < size; i++) {
+        char percent[WORDS_NUMBER_BYTES];
+        if (!(share[i] >= least)) continue;
+        used += (size_t)snprintf(text + used, size - used, "%s%s %s\u202f%%", used > 0 ? ", " : "",
+                                 ischia_params[i].key,
+                                 words_fixed(percent, r->language, 100 * share[i], 0));
+    }
+    return text;
+}
+
+static void put_percent(const struct report *r, double share, char ret[WORDS_NUMBER_BYTES + 8])
+{
+    char number[WORDS_NUMBER_BYTES];
+    (void)snprintf(ret, WORDS_NUMBER_BYTES + 8, "%s\u202f%%",
+                   words_fixed(number, r->language, 100 * share, 0));
+}
+
+static void put_certainty(const struct report *r, const struct ischia_uncertainty *u)
+{
+    char list[160], shear[WORDS_NUMBER_BYTES + 8], compression[WORDS_NUMBER_BYTES + 8];
+    put_percent(r, u->share_shear, shear);
+    put_percent(r, u->share_compression, compression);
+    page_put(r->out, "<p>");
+    page_fill(r->out, r->language, WORD_UNCERTAIN_SHARE,
+              WORDS(word_text("shear", shear), word_text("compression", compression)));
+    page_put(r->out, " ");
+    page_fill(r->out, r->language, WORD_UNCERTAIN_MODEL_FORM,
+              WORDS(word_number("error", ISCHIA_MODEL_FORM_EPS_MAX, 6)));
+    if (list_inputs(r, u->total, 0.05, list, sizeof list)[0] != '\0') {
+        page_put(r->out, " ");
+        page_fill(r->out, r->language, WORD_DAEMON_UNCERTAIN_BETTER,
+                  WORDS(word_text("list", list)));
+    }
+    page_put(r->out, "</p>\n");
+}
+
+static void put_no_interval(const struct report *r, const struct ischia_uncertainty *u)
+{
+    static const enum word why[UNCERTAINTY_STATUS_COUNT] = {
+        [UNCERTAINTY_NO_EMULATOR] = WORD_UNCERTAIN_NONE_NO_EMULATOR,
+        [UNCERTAINTY_OTHER_MODEL] = WORD_UNCERTAIN_NONE_OTHER_MODEL,
+        [UNCERTAINTY_OUTSIDE] = WORD_UNCERTAIN_NONE_OUTSIDE_TRAINING,
+    };
+    char list[160];
+    page_put(r->out, "<p>");
+    page_word(r->out, r->language, WORD_DAEMON_UNCERTAIN_NONE);
+    page_put(r->out, ": ");
+    page_fill(r->out, r->language, why[u->status],
+              WORDS(word_text("keys", list_inputs(r, u->outside, 1e-9, list, sizeof list))));
+    page_put(r->out, "</p>\n");
+}
+
+static void put_any(const struct report *r, const struct ischia_uncertainty *u)
+{
+    page_put(r->out, "<div class=\"uncertain\">\n");
+    if (u->trial) {
+        page_put(r->out, "<p>");
+        page_word(r->out, r->language, WORD_UNCERTAIN_TRIAL);
+        page_put(r->out, "</p>\n");
+    }
+    if (u->status == UNCERTAINTY_GIVEN) {
+        put_intervals(r, u);
+        put_certainty(r, u);
+    } else {
+        put_no_interval(r, u);
+    }
+    page_put(r->out, "</div>\n");
+}
+
+/* Nothing for a result whose inputs were taken as exact. */
+static enum ischia_code put_uncertainty(const struct report *r, struct ischia_error *err)
+{
+    struct ischia_uncertainty u;
+    bool present = false;
+    TRY(uncertainty_doc_read(&u, &present, r->row->result_json, strlen(r->row->result_json), err));
+    if (present) put_any(r, &u);
+    return ISCHIA_OK;
+}
+
 /* ----------------------------------------------------------------------------- words */
 
 static void put_headline(const struct report *r, const char *class, enum word word)
@@ -371,6 +515,7 @@ static enum ischia_code put_result(const struct report *r, const struct ischia_r
     put_seat(r, &result.seat);
     page_put(r->out, "</div>\n</div>\n");
     put_clusters(r, &request->values, &result);
+    TRY(put_uncertainty(r, err));
     if (!r->attached) put_figure(r);
     put_notes(r, &request->values);
     put_end(r, true);

@@ -6,6 +6,7 @@
 #include "api/parameters_doc.h"
 #include "api/problem_doc.h"
 #include "server/http/assets.h"
+#include "server/http/estimate_doc.h"
 #include "server/http/page.h"
 #include "server/http/reply.h"
 #include "server/http/routes.h"
@@ -154,6 +155,10 @@ void handle_version(struct call *call, struct http_response *ret)
     json_close_object(&out);
     json_put_string(&out, "worker", pool.program[0] == '\0' ? NULL : pool.program);
     json_put_integer(&out, "schema", store_schema_version());
+    if (call->service->estimator != NULL)
+        estimate_put_emulator(&out, call->service->estimator);
+    else
+        json_put_null(&out, "emulator");
     json_close_object(&out);
     http_header_static(ret, "Cache-Control", "no-cache");
     send_json(call, &out, ret);

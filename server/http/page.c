@@ -134,7 +134,7 @@ static void put_other_faults(const struct form *form)
     for (size_t i = 0; form->faults != NULL && i < form->faults->count; i++) {
         const struct ischia_fault *fault = &form->faults->item[i];
         bool shown = strcmp(fault->pointer, "/subject") == 0 ||
-                     strcmp(fault->pointer, "/side") == 0 ||
+                     strcmp(fault->pointer, "/side") == 0 || strcmp(fault->pointer, "/sd") == 0 ||
                      strcmp(fault->pointer, "/measured_at") == 0;
         for (int p = 0; p < ISCHIA_PARAM_COUNT; p++)
             shown = shown || strcmp(fault->pointer + 1, ischia_params[p].key) == 0;
@@ -191,27 +191,47 @@ static void put_parameter(const struct form *form, const struct ischia_param_inf
     page_put(form->out, "</p>\n");
 }
 
-static void put_sides(const struct form *form)
+struct choice {
+    const char *value;
+    enum word word;
+};
+
+static void put_choices(const struct form *form, const char *key, enum word label,
+                        const struct choice *choices, size_t count)
 {
-    static const enum word sides[ISCHIA_SIDE_COUNT] = {
-        [ISCHIA_SIDE_NONE] = WORD_DAEMON_FORM_NO_SIDE,
-        [ISCHIA_SIDE_LEFT] = WORD_SIDE_LEFT,
-        [ISCHIA_SIDE_RIGHT] = WORD_SIDE_RIGHT,
-    };
-    char side[16];
-    sent_value(form, "side", side, sizeof side);
-    page_put(form->out, "<p><label for=\"side\">");
-    page_word(form->out, form->language, WORD_LIST_SIDE);
-    page_put(form->out, "</label>\n<select id=\"side\" name=\"side\">\n");
-    for (int i = 0; i < ISCHIA_SIDE_COUNT; i++) {
+    char sent[16];
+    sent_value(form, key, sent, sizeof sent);
+    page_format(form->out, "<p><label for=\"%s\">", key);
+    page_word(form->out, form->language, label);
+    page_format(form->out, "</label>\n<select id=\"%s\" name=\"%s\">\n", key, key);
+    for (size_t i = 0; i < count; i++) {
         page_put(form->out, "<option value=\"");
-        page_put(form->out, ischia_side_names[i]);
-        page_put(form->out, strcmp(side, ischia_side_names[i]) == 0 ? "\" selected>" : "\">");
-        page_word(form->out, form->language, sides[i]);
+        page_put(form->out, choices[i].value);
+        page_put(form->out, strcmp(sent, choices[i].value) == 0 ? "\" selected>" : "\">");
+        page_word(form->out, form->language, choices[i].word);
         page_put(form->out, "</option>\n");
     }
     page_put(form->out, "</select></p>\n");
-    put_faults(form, "side");
+    put_faults(form, key);
+}
+
+static void put_sides(const struct form *form)
+{
+    const struct choice sides[] = {
+        {ischia_side_names[ISCHIA_SIDE_NONE], WORD_DAEMON_FORM_NO_SIDE},
+        {ischia_side_names[ISCHIA_SIDE_LEFT], WORD_SIDE_LEFT},
+        {ischia_side_names[ISCHIA_SIDE_RIGHT], WORD_SIDE_RIGHT},
+    };
+    put_choices(form, "side", WORD_LIST_SIDE, sides, sizeof sides / sizeof sides[0]);
+}
+
+static void put_deviations(const struct form *form)
+{
+    static const struct choice choices[] = {
+        {"", WORD_FORM_SD_NONE},
+        {"typical", WORD_FORM_SD_TYPICAL},
+    };
+    put_choices(form, "sd", WORD_UNCERTAIN_REPORT, choices, sizeof choices / sizeof choices[0]);
 }
 
 static void put_form(const struct form *form)
@@ -234,6 +254,7 @@ static void put_form(const struct form *form)
     put_label(form, "measured_at", words_get(language, WORD_DAEMON_FORM_MEASURED_AT));
     page_put(form->out, "\" autocomplete=\"off");
     put_value(form, "measured_at");
+    put_deviations(form);
     page_put(form->out, "<p><button type=\"submit\">");
     page_word(form->out, language, WORD_DAEMON_FORM_SUBMIT);
     page_put(form->out, "</button></p>\n</form>\n<p><a href=\"/docs\">");

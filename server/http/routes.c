@@ -83,6 +83,8 @@ const struct route routes[] = {
      TYPES("text/html"), TYPES("wait", "lang"), "assessment.read", false},
     {HTTP_POST, "/v1/estimates", "POST /v1/estimates", handle_estimate, AUTH_ASSESS, CASE_BYTES_MAX,
      TYPES(JSON), TYPES(JSON), NULL, NULL, false},
+    {HTTP_POST, "/v1/estimates/what-if", "POST /v1/estimates/what-if", handle_what_if, AUTH_ASSESS,
+     CASE_BYTES_MAX, TYPES(JSON), TYPES(JSON), TYPES("parameter", "points"), NULL, false},
     {HTTP_POST, "/v1/studies", "POST /v1/studies", handle_study_submit, AUTH_ASSESS,
      STUDY_BYTES_MAX, TYPES(JSON, CSV), TYPES(JSON), TYPES("name", "model", "resolution"),
      "study.create", false},

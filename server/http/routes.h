@@ -58,6 +58,7 @@ route_handler handle_events;
 route_handler handle_field, handle_section;
 route_handler handle_report;
 route_handler handle_estimate;
+route_handler handle_what_if;
 route_handler handle_study_submit, handle_study_get, handle_study_list, handle_study_results,
     handle_study_cancel, handle_study_erase;
 route_handler handle_parameters, handle_changes;

@@ -54,6 +54,7 @@ static bool factor_is_valid(const struct design_factor *f)
     if (f->index < 0 || f->index >= (f->is_option ? ISCHIA_OPTION_COUNT : ISCHIA_PARAM_COUNT))
         return false;
     if (f->level_count < 2 || f->level_count > DESIGN_LEVELS_MAX) return false;
+    if (f->log && !(f->level[0] > 0)) return false;
     for (int i = 0; i < f->level_count; i++)
         if (!isfinite(f->level[i]) || (i > 0 && !(f->level[i] > f->level[i - 1]))) return false;
     return true;
@@ -102,10 +103,16 @@ bool design_is_valid(const struct design *design)
     return design != NULL && factors_are_valid(design) && rule_is_valid(design);
 }
 
+static double on_scale(const struct design_factor *factor, double value)
+{
+    return factor->log ? log(value) : value;
+}
+
 double design_normalised(const struct design_factor *factor, double value)
 {
-    const double low = factor->level[0], high = factor->level[factor->level_count - 1];
-    return (value - (low + high) / 2) / ((high - low) / 2);
+    const double low = on_scale(factor, factor->level[0]);
+    const double high = on_scale(factor, factor->level[factor->level_count - 1]);
+    return (on_scale(factor, value) - (low + high) / 2) / ((high - low) / 2);
 }
 
 /* The value at x in [-1, 1] (or beyond, for far axial points). */
@@ -114,6 +121,7 @@ static double value_at(const struct design_factor *factor, double x)
     const double low = factor->level[0], high = factor->level[factor->level_count - 1];
     if (x == -1) return low;
     if (x == 1) return high;
+    if (factor->log) return sqrt(low * high) * pow(high / low, x / 2);
     return (low + high) / 2 + x * ((high - low) / 2);
 }
 

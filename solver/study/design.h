@@ -35,6 +35,7 @@ extern const char *const design_kind_names[DESIGN_KIND_COUNT];
 struct design_factor {
     bool is_option; /* index is an enum ischia_option, else an enum ischia_param */
     int index;
+    bool log; /* between its levels it goes by ratio, not by difference; they are above 0 then */
     int level_count; /* 2 ... DESIGN_LEVELS_MAX, rising; the first and last are -1 and +1 */
     double level[DESIGN_LEVELS_MAX];
 };
@@ -87,7 +88,7 @@ const char *design_factor_name(const struct design_factor *factor, char buffer[D
 /* Finds a factor by that name; false when there is none. Fills is_option and index only. */
 bool design_factor_find(const char *name, struct design_factor *ret);
 
-/* (value - middle) / half range between the first and the last level. */
+/* (value - middle) / half range between the first and the last level, in logarithms for `log`. */
 double design_normalised(const struct design_factor *factor, double value);
 
 #endif

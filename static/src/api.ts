@@ -3,7 +3,7 @@
 // The one place that talks to the daemon. Every address is a path: nothing but the daemon that
 // served the page is ever asked.
 import { language } from './i18n.js';
-import type { Assessment, ParameterInfo, Problem } from './types.js';
+import type { Assessment, Estimate, ParameterInfo, Problem, WhatIf } from './types.js';
 
 /* What went wrong with a request: the daemon's own problem document, or status 0 when it could
  * not be reached at all. */
@@ -78,10 +78,13 @@ export async function get_parameters(): Promise<Parameters> {
   };
 }
 
-/* The version of the program that answers. */
-export async function get_version(): Promise<string> {
-  return (await request<{ version: string }>('/version')).version;
+/* The program that answers; emulator: null when it gives no estimates. */
+export interface Version {
+  version: string;
+  emulator?: { rows: number; trial: boolean } | null;
 }
+
+export const get_version = (): Promise<Version> => request('/version');
 
 /* 128 random bits; crypto.randomUUID() does not exist on plain http, which clinics do use. */
 export function new_idempotency_key(): string {
@@ -90,8 +93,25 @@ export function new_idempotency_key(): string {
 }
 
 export interface Submission {
-  [key: string]: number | string;
+  [key: string]: number | string | Record<string, number>;
 }
+
+const json_post = (body: unknown, signal: AbortSignal): RequestInit => ({
+  method: 'POST',
+  headers: { 'Content-Type': 'application/json' },
+  body: JSON.stringify(body),
+  signal,
+});
+
+/* By the emulator, at once; nothing is stored. */
+export const estimate = (
+  parameters: Record<string, number>,
+  signal: AbortSignal,
+): Promise<Estimate> => request('/v1/estimates', json_post(parameters, signal));
+
+/* The same along the range of one input. body: parameters, with the options of an assessment. */
+export const what_if = (body: unknown, input: string, signal: AbortSignal): Promise<WhatIf> =>
+  request(`/v1/estimates/what-if?parameter=${encodeURIComponent(input)}`, json_post(body, signal));
 
 export function submit(body: Submission, idempotency_key: string): Promise<Assessment> {
   return request('/v1/assessments', {

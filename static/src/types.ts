@@ -18,6 +18,59 @@ export interface ParameterInfo {
   description: string;
   accepted: Range;
   studied: Range;
+  sd?: { max: number; typical: { absolute: number; relative: number } };
+}
+
+/* What the emulator says of one number: low to high is a 95 % band. */
+export interface Estimated {
+  value: number;
+  low: number;
+  high: number;
+}
+
+interface EstimatedGroups {
+  strain: Record<'eps_max' | 'E_shear_max' | 'E_comp_max', Estimated | null> | null;
+  clusters: Record<'shear' | 'compression' | 'both', { volume_mm3: Estimated | null }> | null;
+  threshold_force_N: Record<'shear' | 'compression', Estimated | null> | null;
+}
+
+export interface Estimate extends EstimatedGroups {
+  kind: 'estimate';
+  emulator: { trial: boolean };
+  warnings: FieldError[];
+}
+
+export interface WhatIfPoint extends EstimatedGroups {
+  at: number;
+  margin: Record<'shear' | 'compression', Estimated | null>;
+}
+
+export interface WhatIf {
+  kind: 'what_if';
+  parameter: string;
+  unit: string;
+  points: WhatIfPoint[];
+  target_force_N: Record<'shear' | 'compression', Estimated | null> | null;
+}
+
+/* Values at 5, 25, 50, 75 and 95 %; null: not reached. */
+export type Quantiles = (number | null)[];
+
+export interface Uncertainty {
+  status: 'given' | 'no_emulator' | 'other_model' | 'outside_training';
+  typical: boolean;
+  sd: Record<string, number>;
+  trial: boolean;
+  samples: number;
+  inside: number;
+  outside: Record<string, number>;
+  strain: Record<'eps_max' | 'E_shear_max' | 'E_comp_max', Quantiles>;
+  clusters: Record<'shear' | 'compression' | 'both', { volume_mm3: Quantiles }>;
+  threshold_force_N: Record<'shear' | 'compression', Quantiles>;
+  share_crossing: Record<'shear' | 'compression' | 'both', number | null>;
+  sensitivity: Record<'first_order' | 'total', Record<string, number | null>>;
+  model_form_error: { eps_max: number };
+  checks: { eps_max: number | null; low: number; high: number }[];
 }
 
 export interface Cluster {
@@ -69,6 +122,7 @@ export interface Result {
     cpu_s: number;
   };
   model: { name: string; version: number };
+  uncertainty?: Uncertainty;
 }
 
 export interface FieldError {
@@ -98,6 +152,7 @@ export interface Assessment {
   label?: string | null;
   measured_at?: string | null;
   resolution?: string;
+  sd?: 'typical' | Record<string, number> | null;
   skin?: { mu: number; thickness: number } | null;
   parameters: Record<string, number>;
   progress: number;

@@ -33,7 +33,7 @@ class BadCase(cli.Case):
                 (case(R1=12, R2=9), ["R2 is 9 mm and R1 is 12 mm; accepted R2 >= R1"]),
                 (case(eG=3), ["eG is not a known key; did you mean eF?"]),
                 (case(side="L"), ['side is "L"; accepted left, right']),
-                (case(sd={"R1": 1}), ["sd is given"]),
+                (case(sd={"R1": 13}), ["sd.R1 is 13", "0 to 12 mm"]),
         ]:
             with self.subTest(text):
                 self.refuse(text, *words, lines=1)

@@ -63,4 +63,4 @@ def write_emulator(path):
     body = json.dumps(document) + '\n'
     digest = hashlib.sha256(body.encode()).hexdigest()
     with open(path, 'w', encoding='ascii') as file:
-        file.write(f'ischia emulator 1 sha256 {digest}\n{body}')
+        file.write(f'ischia emulator 2 sha256 {digest}\n{body}')

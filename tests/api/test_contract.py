@@ -203,6 +203,12 @@ class Contract(unittest.TestCase):
             ask('POST', one, one, body, headers)
         ask('GET', one, one)
         ask('POST', one, one, json.dumps(inside).encode(), {**JSON, 'Accept': 'image/png'})
+        sweep = one + '/what-if'
+        for query in ('', '?parameter=R2&points=5', '?parameter=x', '?points=1', '?other=1'):
+            ask('POST', sweep + query, sweep, inside)
+        for body in (side(R1=4), side(muM=99)):
+            ask('POST', sweep, sweep, body)
+        ask('GET', sweep, sweep)
 
     def tour_of_studies(self, ask):
         many, csv_type = '/v1/studies', {'Content-Type': 'text/csv'}

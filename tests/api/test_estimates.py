@@ -89,12 +89,80 @@ class Estimates(unittest.TestCase):
         self.assertEqual(self.service.get('/v1/changes').json()['last_seq'], 0)
 
 
+class WhatIf(unittest.TestCase):
+    """POST /v1/estimates/what-if: the same numbers along one input."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        path = os.path.join(cls.folder.name, 'emulator.txt')
+        write_emulator(path)
+        cls.service = Service('--emulator', path)
+        cls.service.until_ready()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.service.stop()
+        cls.folder.cleanup()
+
+    def sweep(self, query='', **changes):
+        answer = self.service.ask('POST', '/v1/estimates/what-if' + query, {**INSIDE, **changes})
+        self.assertEqual(answer.status, 200, answer.body)
+        return answer.json()
+
+    def test_each_point_is_the_estimate_there(self):
+        document = self.sweep('?parameter=muM&points=9')
+        self.assertEqual((document['kind'], document['parameter']), ('what_if', 'muM'))
+        self.assertEqual([p['at'] for p in document['points']], [1 + 7 * k / 8 for k in range(9)])
+        for point in document['points']:
+            value, half = eps_max({**INSIDE, 'muM': point['at']})
+            got = point['strain']['eps_max']
+            self.assertAlmostEqual(got['value'], value, places=12)
+            self.assertAlmostEqual(got['high'], value + half, places=12)
+
+    def test_force_is_the_usual_one(self):
+        document = self.sweep()
+        self.assertEqual((document['parameter'], document['unit']), ('F', 'N'))
+        self.assertEqual(len(document['points']), 41)
+        self.assertEqual((document['points'][0]['at'], document['points'][-1]['at']), BOX['F'])
+        # crossed at 250 N: below that the threshold is not reached
+        crossed = [p['threshold_force_N']['shear'] for p in document['points']]
+        self.assertEqual([c is not None for c in crossed], [p['at'] >= 250 for p in document['points']])
+        self.assertEqual(self.sweep(F=200)['target_force_N']['shear']['value'], 250)
+
+    def test_margins_are_thresholds_less_strains(self):
+        margin = self.sweep('?points=2')['points'][0]['margin']
+        self.assertAlmostEqual(margin['shear']['value'], 0.75 - 1.5)
+        self.assertAlmostEqual(margin['shear']['low'], 0.75 - 1.6)
+        self.assertAlmostEqual(margin['compression']['high'], 0.45 - 0.39)
+        self.assertAlmostEqual(margin['compression']['low'], 0.45 - 0.5)
+
+    def test_points_are_cases(self):
+        document = self.sweep('?parameter=R2', R1=8)
+        self.assertEqual(document['points'][0]['at'], 15)  # the box, above R1
+        document = self.sweep('?parameter=R1', R2=15)
+        self.assertEqual(document['points'][-1]['at'], 9)
+
+    def test_outside_there_are_none(self):
+        document = self.sweep(R1=4)
+        self.assertEqual(document['points'], [])
+        self.assertIsNone(document['target_force_N'])
+        self.assertIn('outside_training', [w['code'] for w in document['warnings']])
+        # the input itself may lie outside: its range is what is asked about
+        self.assertEqual(len(self.sweep('?parameter=R1', R1=4)['points']), 41)
+
+    def test_queries_that_make_no_sense(self):
+        for query in ('?parameter=skin', '?parameter=', '?points=1', '?points=202', '?points=x'):
+            answer = self.service.ask('POST', '/v1/estimates/what-if' + query, INSIDE)
+            self.assertEqual(answer.status, 400, query)
+
+
 class Installing(unittest.TestCase):
     def test_without_one_there_are_none(self):
-        with Service() as service:
+        with Service('--emulator', 'none') as service:
             answer = service.ask('POST', '/v1/estimates', INSIDE)
             self.assertEqual(answer.status, 404)
-            self.assertIn('No trained emulator is installed', answer.json()['detail'])
+            self.assertIn('No trained emulator is in use', answer.json()['detail'])
 
     def test_a_damaged_one_is_refused_at_start(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -18,7 +18,7 @@ export const csp =
   "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
 
 /* Names and descriptions are not the daemon's, so that what the page takes from it can be told. */
-const parameter = (key, unit, description, accepted, studied) => ({
+const parameter = (key, unit, description, accepted, studied, sd) => ({
   key,
   name: `Stand-in ${key}`,
   aliases: [],
@@ -26,18 +26,33 @@ const parameter = (key, unit, description, accepted, studied) => ({
   description,
   accepted: { min: accepted[0], max: accepted[1] },
   studied: { min: studied[0], max: studied[1] },
+  sd: { max: accepted[1] - accepted[0], typical: { absolute: sd[0], relative: sd[1] } },
 });
 
 export const parameters = {
   model: { name: 'macron2020-local', version: 1 },
   parameters: [
-    parameter('R1', 'mm', 'Smaller radius of curvature of the ischium.', [3, 15], [4.8, 9]),
-    parameter('R2', 'mm', 'Radius of curvature in the orthogonal plane.', [8, 120], [15, 63.3]),
-    parameter('eM', 'mm', 'Thickness of the muscle, unloaded.', [5, 60], [19, 39]),
-    parameter('eF', 'mm', 'Thickness of the fat, unloaded.', [3, 60], [9, 35]),
-    parameter('muM', 'kPa', 'Shear modulus of the muscle.', [0.5, 30], [1, 8]),
-    parameter('muF', 'kPa', 'Shear modulus of the fat.', [0.5, 30], [2.75, 8]),
-    parameter('F', 'N', 'Vertical force on this side.', [1, 600], [192, 429]),
+    parameter(
+      'R1',
+      'mm',
+      'Smaller radius of curvature of the ischium.',
+      [3, 15],
+      [4.8, 9],
+      [0.84, 0],
+    ),
+    parameter(
+      'R2',
+      'mm',
+      'Radius of curvature in the orthogonal plane.',
+      [8, 120],
+      [15, 63.3],
+      [10.6, 0],
+    ),
+    parameter('eM', 'mm', 'Thickness of the muscle, unloaded.', [5, 60], [19, 39], [2, 0]),
+    parameter('eF', 'mm', 'Thickness of the fat, unloaded.', [3, 60], [9, 35], [3, 0]),
+    parameter('muM', 'kPa', 'Shear modulus of the muscle.', [0.5, 30], [1, 8], [0, 0.2]),
+    parameter('muF', 'kPa', 'Shear modulus of the fat.', [0.5, 30], [2.75, 8], [0, 0.2]),
+    parameter('F', 'N', 'Vertical force on this side.', [1, 600], [192, 429], [0, 0.1]),
   ],
   options: [
     {
@@ -108,6 +123,115 @@ function load_curve(F, top_shear, top_comp) {
       E_comp_max: top_comp * grown,
     };
   });
+}
+
+const around = (value, part) =>
+  [-1.6, -0.7, 0, 0.7, 1.6].map((z) => Number((value * (1 + z * part)).toPrecision(8)));
+
+/* As the daemon gives it; a subject `outside...` has no interval. */
+function uncertainty_of(document, result) {
+  const keys = parameters.parameters.map(({ key }) => key);
+  const all = (value) => Object.fromEntries(keys.map((key) => [key, value]));
+  const given = !document.subject?.startsWith('outside');
+  const five = (value, part) => (given ? around(value, part) : Array(5).fill(null));
+  const total = { ...all(0), R2: 0.61, muM: 0.22, F: 0.12, R1: 0.04 };
+  return {
+    status: given ? 'given' : 'outside_training',
+    typical: document.sd === 'typical',
+    sd: document.sd === 'typical' ? all(1) : { ...all(0), ...document.sd },
+    trial: false,
+    samples: 2048,
+    inside: given ? 2000 : 900,
+    outside: { ...all(0), R2: given ? 0.023 : 0.56 },
+    quantiles: [0.05, 0.25, 0.5, 0.75, 0.95],
+    strain: {
+      eps_max: five(result.strain.eps_max, 0.05),
+      E_shear_max: five(result.strain.E_shear_max, 0.05),
+      E_comp_max: five(result.strain.E_comp_max, 0.005),
+    },
+    clusters: {
+      shear: { volume_mm3: five(result.clusters.shear.volume_mm3, 0.1) },
+      compression: { volume_mm3: five(result.clusters.compression.volume_mm3, 0.1) },
+      both: { volume_mm3: five(result.clusters.both.volume_mm3, 0.1) },
+    },
+    threshold_force_N: {
+      shear: five(33, 0.1),
+      compression: given ? [30, 35, 40, null, null] : Array(5).fill(null),
+    },
+    share_crossing: given
+      ? { shear: 1, compression: 0.63, both: 0.63 }
+      : { shear: null, compression: null, both: null },
+    sensitivity: { first_order: total, total: given ? total : all(null) },
+    emulator_sd: given ? 0.008 : null,
+    model_form_error: { eps_max: 0.075 },
+    checks: given
+      ? [1.2, 1.25, null, 1.3].map((eps_max) => ({
+          parameters: document.parameters,
+          eps_max,
+          estimate: 1.25,
+          low: 1.21,
+          high: 1.31,
+        }))
+      : [],
+  };
+}
+
+const band = (value, half) => ({ value, low: value - half, high: value + half });
+
+/* An emulator made up of one line; R2 above 63 is outside what it knows. */
+function groups_at(p) {
+  const eps = 0.9 + 0.0015 * p.F - 0.02 * p.muM;
+  return {
+    strain: {
+      eps_max: band(eps, 0.03),
+      E_shear_max: band(1.5 * eps, 0.05),
+      E_comp_max: band(0.46, 0.01),
+    },
+    clusters: {
+      shear: { volume_mm3: band(60 * p.F, 300) },
+      compression: { volume_mm3: band(30 * p.F, 200) },
+      both: { volume_mm3: band(28 * p.F, 200) },
+    },
+    seat: { displacement_mm: band(30, 1) },
+    threshold_force_N: { shear: band(33, 2), compression: band(40, 3) },
+  };
+}
+const none = { strain: null, clusters: null, seat: null, threshold_force_N: null };
+const knows = (p) => p.R2 <= 63;
+const outside_training = { code: 'outside_training', pointer: '/R2', detail: 'R2 is outside' };
+
+function estimate_of(p, emulator) {
+  return {
+    kind: 'estimate',
+    parameters: p,
+    ...(knows(p) ? groups_at(p) : none),
+    emulator,
+    warnings: knows(p) ? [] : [outside_training],
+  };
+}
+
+function what_if_of(body, key, emulator) {
+  const { unit, studied } = parameters.parameters.find((p) => p.key === key);
+  const at = (i) => studied.min + ((studied.max - studied.min) * i) / 40;
+  const points = Array.from({ length: 41 }, (_, i) => ({ ...body, [key]: at(i) })).filter(knows);
+  return {
+    kind: 'what_if',
+    parameters: body,
+    parameter: key,
+    unit,
+    points: points.map((p) => {
+      const groups = groups_at(p);
+      const { E_shear_max: e, E_comp_max: c } = groups.strain;
+      const margin = {
+        shear: band(0.75 - e.value, 0.05),
+        compression: band(0.45 - c.value, 0.01),
+      };
+      return { at: p[key], ...groups, margin };
+    }),
+    target_force_N: knows(body) ? groups_at(body).threshold_force_N : null,
+    emulator,
+    warnings: [],
+  };
 }
 
 function result_of(document) {
@@ -191,6 +315,13 @@ const warnings_of = (p) =>
       detail: `${key} is outside the studied range`,
     }));
 
+async function text_of(request) {
+  let text = '';
+  for await (const chunk of request) text += chunk;
+  return text;
+}
+const body_of = async (request) => JSON.parse(await text_of(request));
+
 const ended = (document) => !['queued', 'running'].includes(document.status);
 
 export class StandIn {
@@ -201,6 +332,8 @@ export class StandIn {
     this.streams = new Set();
     this.requests = [];
     this.next = 1;
+    this.emulator = null; /* what it makes estimates with, when a test gives it one */
+    this.bodies = []; /* of what was asked to be computed */
     this.timer = setInterval(() => this.advance(), 60);
   }
 
@@ -254,6 +387,7 @@ export class StandIn {
     } else {
       document.status = 'succeeded';
       document.result = result_of(document);
+      if (document.sd) document.result.uncertainty = uncertainty_of(document, document.result);
     }
   }
 
@@ -283,7 +417,17 @@ export class StandIn {
     const tag = url.searchParams.get('lang') ?? request.headers['accept-language']?.slice(0, 2);
     if (url.pathname === '/v1/parameters') return this.json(response, 200, parameters_in(tag));
     if (url.pathname === '/version')
-      return this.json(response, 200, { program: 'stand-in', version: '0.0.0' });
+      return this.json(response, 200, {
+        program: 'stand-in',
+        version: '0.0.0',
+        emulator: this.emulator,
+      });
+    if (url.pathname === '/v1/estimates')
+      return this.json(response, 200, estimate_of(await body_of(request), this.emulator));
+    if (url.pathname === '/v1/estimates/what-if') {
+      const key = url.searchParams.get('parameter');
+      return this.json(response, 200, what_if_of(await body_of(request), key, this.emulator));
+    }
     if (url.pathname === '/v1/assessments' && request.method === 'POST')
       return this.create(request, response);
     if (url.pathname === '/v1/assessments') return this.list(url, response);
@@ -298,14 +442,14 @@ export class StandIn {
   }
 
   async create(request, response) {
-    let text = '';
-    for await (const chunk of request) text += chunk;
+    const text = await text_of(request);
     const plain = request.headers['content-type'].startsWith('application/x-www-form-urlencoded');
     const body = plain
       ? Object.fromEntries(
           [...new URLSearchParams(text)].map(([k, v]) => [k, /^[\d.]+$/.test(v) ? Number(v) : v]),
         )
       : JSON.parse(text);
+    this.bodies.push(body);
     if (body.subject?.startsWith('busy')) {
       return this.json(response, 429, { title: 'Queue full', status: 429 }, { 'Retry-After': '1' });
     }
@@ -339,6 +483,7 @@ export class StandIn {
       side: body.side ?? null,
       label: null,
       measured_at: body.measured_at || null,
+      sd: body.sd || null,
       parameters: Object.fromEntries(parameters.parameters.map(({ key }) => [key, body[key]])),
       progress: 0,
       result: null,
@@ -399,6 +544,8 @@ export class StandIn {
     const stream = { id, response };
     this.streams.add(stream);
     response.on('close', () => this.streams.delete(stream));
+    const document = this.documents.get(id);
+    if (ended(document)) this.tell(document); /* between the page's look and its listening */
   }
 
   async file(path, tag, response) {

@@ -112,7 +112,7 @@ static void say_result(struct fake *fake, const struct ischia_result *result)
     const struct ischia_case c = make_case();
     char *text = NULL;
     size_t size;
-    require(result_doc_text(&text, &c, result, 0, NULL) == ISCHIA_OK);
+    require(result_doc_text(&text, &c, result, NULL, 0, NULL) == ISCHIA_OK);
     size = strlen(text);
     struct message message = {.kind = MESSAGE_RESULT, .job = fake->order.job};
     char *json = NULL;
@@ -342,7 +342,7 @@ static void serve(struct fake *fake, struct frame_reader *reader)
 
 int main(int argc, char **argv)
 {
-    const char *mode = argc == 4 ? argv[1] : "";
+    const char *mode = argc >= 4 ? argv[1] : "";
     require(argc >= 3 && strcmp(argv[argc - 2], "--fd") == 0);
     struct fake fake = {.fd = (int)strtol(argv[argc - 1], NULL, 10)};
     if (strcmp(mode, "exit_first") == 0) return 5;

@@ -14,10 +14,10 @@ static void result(const char *text, size_t length)
     struct ischia_result first, second;
     char *once, *twice;
     if (result_doc_read(&first, NULL, text, length, &json_limits_stored, NULL) != ISCHIA_OK) return;
-    MUST(result_doc_text(&once, &c, &first, 0, NULL) == ISCHIA_OK);
+    MUST(result_doc_text(&once, &c, &first, NULL, 0, NULL) == ISCHIA_OK);
     MUST(result_doc_read(&second, NULL, once, strlen(once), &json_limits_stored, NULL) ==
          ISCHIA_OK);
-    MUST(result_doc_text(&twice, &c, &second, 0, NULL) == ISCHIA_OK);
+    MUST(result_doc_text(&twice, &c, &second, NULL, 0, NULL) == ISCHIA_OK);
     MUST(strcmp(once, twice) == 0);
     free(once);
     free(twice);

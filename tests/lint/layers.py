@@ -11,7 +11,7 @@ ROOMS = (
     ("solver/result.", PLAIN),
     ("solver/", ("solver/!study/",)),
     ("api/", ("api/", "words/keys.h", "solver/study/design.h", "solver/study/predictor.h",
-              *PLAIN)),
+              "solver/study/sampling.h", "solver/study/uncertainty.h", *PLAIN)),
     ("server/cli/", ("server/!http/!store/", "api/", "solver/solver.h", "solver/study/", *PLAIN)),
     ("server/store/", ("server/!http/!cli/", "api/", *PLAIN)),
     ("server/", ("server/!cli/", "api/", *PLAIN)),

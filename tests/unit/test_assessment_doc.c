@@ -34,6 +34,7 @@ static void a_queued_side(void **state)
         "\"created_at\":\"2026-03-01T09:30:00.000Z\",\"started_at\":null,\"finished_at\":null,"
         "\"subject\":\"P-017\",\"side\":\"left\",\"label\":null,\"measured_at\":null,"
         "\"parameters\":{\"R1\":7.1,\"R2\":22.8,\"eM\":31,\"eF\":10,\"muM\":8,\"muF\":5,\"F\":258},"
+        "\"sd\":null,"
         "\"skin\":{\"mu\":67,\"thickness\":1},\"resolution\":\"standard\","
         "\"model\":{\"name\":\"default\",\"L_over_h\":2,\"bulk_ratio\":2000,\"friction\":0.4,"
         "\"R2_surface\":0,\"embed_over_R1\":1},"

@@ -154,8 +154,15 @@ static void bad_optional_values(void **state)
         {"\"measured_at\":\"yesterday\"", "/measured_at", "malformed"},
         {"\"label\":\"a\\nb\"", "/label", "malformed"},
         {"\"label\":{}", "/label", "wrong_type"},
-        {"\"sd\":{\"R1\":1}", "/sd", "unsupported"},
-        {"\"sd\":\"typical\"", "/sd", "unsupported"},
+        {"\"sd\":\"usual\"", "/sd", "not_allowed"},
+        {"\"sd\":1", "/sd", "wrong_type"},
+        {"\"sd\":{\"R1\":-0.1}", "/sd/R1", "out_of_range"},
+        {"\"sd\":{\"R1\":12.1}", "/sd/R1", "out_of_range"},
+        {"\"sd\":{\"R1\":\"1\"}", "/sd/R1", "wrong_type"},
+        {"\"sd\":{\"R1\":1,\"R1\":1}", "/sd/R1", "duplicate"},
+        {"\"sd\":{\"muM\":1,\"\u03BCM\":1}", "/sd/muM", "duplicate"},
+        {"\"sd\":{\"skin\":1}", "/sd/skin", "unknown"},
+        {"\"sd.R1\":1", "/sd.R1", "unknown"},
         {"\"skin\":67", "/skin", "wrong_type"},
         {"\"skin\":{\"mu\":1}", "/skin/mu", "out_of_range"},
         {"\"skin\":{\"mu\":\"67\"}", "/skin/mu", "wrong_type"},
@@ -388,8 +395,9 @@ static void form_faults(void **state)
         ISCHIA_OK);
     expect_faults(5);
     expect_fault(0, "/R1", "duplicate", "R1 is given more than once");
-    assert_string_equal(faults.item[1].code, "unsupported");
+    assert_string_equal(faults.item[1].code, "not_allowed");
     assert_string_equal(faults.item[2].pointer, "/skin");
+    assert_string_equal(faults.item[2].code, "unsupported");
     assert_string_equal(faults.item[3].code, "unknown");
     expect_fault(4, "/muM", "missing", "muM is missing; accepted 0.5 to 30 kPa");
 }

@@ -110,6 +110,29 @@ static void space_filling_points_stay_inside(void **state)
     }
 }
 
+static void a_log_factor_goes_by_ratio(void **state)
+{
+    struct design d = {
+        .kind = DESIGN_SOBOL, .points = 64, .seed = 3, .base = ischia_case_default()};
+    struct design_points points;
+    (void)state;
+    add_factor(&d, "muM", 2, (const double[]){0.5, 32});
+    d.factor[0].log = true;
+    assert_true(design_is_valid(&d));
+    assert_int_equal(design_points_init(&points, &d, 64, NULL), ISCHIA_OK);
+    int below = 0;
+    for (size_t i = 0; i < points.count; i++) {
+        assert_true(points.value[i] >= 0.5 && points.value[i] <= 32);
+        below += points.value[i] < 4; /* the geometric middle */
+    }
+    assert_int_equal(below, 32);
+    assert_true(fabs(design_normalised(&d.factor[0], 4)) < 1e-12);
+    assert_true(fabs(design_normalised(&d.factor[0], 0.5) + 1) < 1e-12);
+    design_points_finish(&points);
+    d.factor[0].level[0] = 0;
+    assert_false(design_is_valid(&d));
+}
+
 static void each_morris_step_moves_one_factor(void **state)
 {
     (void)state;
@@ -198,6 +221,7 @@ int main(void)
         cmocka_unit_test(a_ninth_fraction_keeps_pairs_balanced),
         cmocka_unit_test(a_central_composite_has_corners_axes_and_centre),
         cmocka_unit_test(space_filling_points_stay_inside),
+        cmocka_unit_test(a_log_factor_goes_by_ratio),
         cmocka_unit_test(each_morris_step_moves_one_factor),
         cmocka_unit_test(options_are_factors_too),
         cmocka_unit_test(bad_designs_are_invalid),

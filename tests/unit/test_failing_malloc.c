@@ -48,7 +48,7 @@ static enum ischia_code write_result(void)
 {
     const struct ischia_request request = sample_request();
     const struct ischia_result result = sample_result();
-    return free_text(result_doc_text(&text, &request.values, &result, 2, &err));
+    return free_text(result_doc_text(&text, &request.values, &result, NULL, 2, &err));
 }
 
 static enum ischia_code read_result(void)
@@ -59,7 +59,8 @@ static enum ischia_code read_result(void)
         char *written;
         const struct ischia_request request = sample_request();
         failing_malloc_disarm();
-        assert_int_equal(result_doc_text(&written, &request.values, &result, 0, &err), ISCHIA_OK);
+        assert_int_equal(result_doc_text(&written, &request.values, &result, NULL, 0, &err),
+                         ISCHIA_OK);
         (void)snprintf(json, sizeof json, "%s", written);
         free(written);
         failing_malloc_arm(1, false);

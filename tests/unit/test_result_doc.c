@@ -9,7 +9,7 @@ static char *written; /* not a local: gcc 12 would take it for a dangling pointe
 static char *write_result(const struct ischia_result *result)
 {
     const struct ischia_request request = sample_request();
-    assert_int_equal(result_doc_text(&written, &request.values, result, 0, &err), ISCHIA_OK);
+    assert_int_equal(result_doc_text(&written, &request.values, result, NULL, 0, &err), ISCHIA_OK);
     return written;
 }
 
@@ -105,7 +105,7 @@ static void nonsense_is_not_written(void **state)
     results[2].numerics.force_residual = (double)NAN;
     results[3].load_curve[1].displacement_mm = (double)INFINITY;
     for (int i = 0; i < 4; i++)
-        assert_int_equal(result_doc_text(&text, &request.values, &results[i], 0, &err),
+        assert_int_equal(result_doc_text(&text, &request.values, &results[i], NULL, 0, &err),
                          ISCHIA_E_NUMERIC);
     assert_null(text);
 }

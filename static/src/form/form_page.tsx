@@ -3,8 +3,10 @@
 // The form: a person, two sides, one button.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { get_parameters, type Parameters } from '../api.js';
+import { use_emulator } from '../emulator.js';
 import { language, t } from '../i18n.js';
 import type { Side } from '../types.js';
+import { Deviations, DeviationFields } from './deviations.js';
 import { field_id } from './field.js';
 import { sides } from './model.js';
 import { PersonFields } from './person.js';
@@ -80,6 +82,7 @@ function submit_label(filled: Side[]): string {
 export function FormPage(props: { from: string[] }) {
   const [parameters, failed, again] = use_parameters();
   const form = use_form(parameters, props.from);
+  const previews = use_emulator();
   if (!parameters) return <Loading failed={failed} again={again} />;
   const { person, entries, failure, sending } = form;
   const send = (e: Event): void => {
@@ -101,9 +104,11 @@ export function FormPage(props: { from: string[] }) {
             refused={form.refused[side]}
             on_change={(entry, key) => form.change_side(side, entry, key)}
             on_copy={() => form.copy_stiffness(side)}
+            preview={previews}
           />
         ))}
       </div>
+      <DeviationFields person={person} inputs={parameters.inputs} on_change={form.set_person} />
       <div class="submit">
         <button type="submit" class="primary" aria-disabled={sending}>
           {sending ? t('form.submitting') : submit_label(form.filled)}
@@ -117,6 +122,7 @@ export function FormPage(props: { from: string[] }) {
           value={person.resolution}
           change={(resolution) => form.set_person({ ...person, resolution })}
         />
+        <Deviations person={person} on_change={form.set_person} />
       </div>
     </form>
   );

@@ -18,6 +18,8 @@ export interface Person {
   measured_at: string;
   broken_date: boolean; /* begun and not finished: the browser then gives no value at all */
   resolution: string;
+  sd: 'none' | 'typical' | 'own';
+  sd_text: Record<string, string>; /* of "own", by input */
 }
 
 export interface Finding {
@@ -109,6 +111,29 @@ export function server_faults(errors: FieldError[]): Map<string, Finding> {
 export const subject_is_valid = (subject: string): boolean =>
   subject === '' || /^[A-Za-z0-9._-]{1,64}$/.test(subject);
 
+/* What was typed that is no standard deviation; '' is one: the input is known exactly. */
+export function sd_is_good(text: string): boolean {
+  const p = parse_number(text);
+  return p.kind === 'empty' || (p.kind === 'number' && p.value >= 0);
+}
+
+function own_sd(person: Person): Record<string, number> {
+  const given = Object.entries(person.sd_text).flatMap(([key, text]) => {
+    const p = parse_number(text);
+    return p.kind === 'number' ? [[key, p.value] as const] : [];
+  });
+  return Object.fromEntries(given);
+}
+
+/* All seven numbers, when each can be used as it stands; else null. */
+export function whole_side(
+  entry: SideEntry,
+  inputs: ParameterInfo[],
+): Record<string, number> | null {
+  if (faults(entry, inputs).size > 0) return null;
+  return Object.fromEntries(inputs.map(({ key }) => [key, value_of(entry, key) as number]));
+}
+
 export function submission(
   side: Side,
   entry: SideEntry,
@@ -120,5 +145,7 @@ export function submission(
   if (person.subject !== '') body['subject'] = person.subject;
   if (person.measured_at !== '') body['measured_at'] = person.measured_at;
   if (person.resolution !== 'standard') body['resolution'] = person.resolution;
+  if (person.sd === 'typical') body['sd'] = 'typical';
+  if (person.sd === 'own') body['sd'] = own_sd(person);
   return body;
 }

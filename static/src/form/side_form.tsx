@@ -7,6 +7,7 @@ import type { Parameters } from '../api.js';
 import type { ParameterInfo, Side } from '../types.js';
 import { Drawing } from './drawing.js';
 import { Field } from './field.js';
+import { Preview } from './preview.js';
 import { finding, value_of, type Finding, type SideEntry } from './model.js';
 
 export interface SideFormProps {
@@ -16,6 +17,7 @@ export interface SideFormProps {
   refused: Map<string, Finding>; /* shown until the field is changed */
   on_change: (entry: SideEntry, key: string) => void;
   on_copy: () => void;
+  preview: boolean; /* there is an emulator to ask */
 }
 
 function swapped(entry: SideEntry): SideEntry {
@@ -95,6 +97,7 @@ export function SideForm(props: SideFormProps) {
         <button type="button" class="quiet" onClick={props.on_copy}>
           {t('form.copy')}
         </button>
+        {props.preview && <Preview entry={entry} inputs={parameters.inputs} side={name} />}
       </div>
     </fieldset>
   );

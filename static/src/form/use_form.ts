@@ -7,8 +7,10 @@ import { t } from '../i18n.js';
 import { navigate, result_address } from '../router.js';
 import type { Assessment, ParameterInfo, Side } from '../types.js';
 import { announce } from '../ui.js';
+import { sd_id } from './deviations.js';
 import {
   empty_side,
+  sd_is_good,
   faults,
   is_empty,
   server_faults,
@@ -34,6 +36,8 @@ const nobody: Person = {
   measured_at: '',
   broken_date: false,
   resolution: 'standard',
+  sd: 'none',
+  sd_text: {},
 };
 const nothing = (): Entries => ({ left: empty_side(), right: empty_side() });
 const no_refusals = (): Refused => ({ left: new Map(), right: new Map() });
@@ -130,12 +134,15 @@ export function use_form(parameters: Parameters | null, from: string[]) {
 
   /* True when nothing is wrong that can be seen from here. */
   const check = (inputs: ParameterInfo[]): boolean => {
+    const bad_sd =
+      person.sd === 'own' && inputs.find(({ key }) => !sd_is_good(person.sd_text[key] ?? ''))?.key;
     const found = no_refusals();
     for (const side of filled) found[side] = faults(entries[side], inputs);
     if (filled.length === 0) set_failure({ text: t('form.error.empty'), fields: [] });
     else if (found.left.size + found.right.size > 0) refuse(found);
     else if (!subject_is_valid(person.subject)) document.getElementById('subject')?.focus();
     else if (person.broken_date) document.getElementById('measured_at')?.focus();
+    else if (bad_sd) document.getElementById(sd_id(bad_sd))?.focus();
     else return true;
     return false;
   };

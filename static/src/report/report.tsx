@@ -7,6 +7,8 @@ import { get_version, section_path, type Parameters } from '../api.js';
 import { format, format_fixed, format_percent, format_time, t } from '../i18n.js';
 import { Symbol_ } from '../form/field.js';
 import { general_caveats, warning_text } from '../result/caveats.js';
+import { interval_text } from '../result/interval.js';
+import { by_share, keys_outside } from '../result/uncertainty.js';
 import { share_of_muscle, tip_height, type Finished } from '../result/quantities.js';
 import type { ClusterSet } from '../types.js';
 import { column_names, Shape } from '../ui.js';
@@ -141,6 +143,27 @@ function Clusters(props: { of: Finished; skin_mm: number }) {
   );
 }
 
+/* The interval in a few lines: what it is, and what to measure better. */
+function Certainty(props: { of: Finished }) {
+  const u = props.of.result.uncertainty;
+  if (!u) return null;
+  if (u.status !== 'given')
+    return <p class="certainty">{t(`uncertain.none.${u.status}`, { keys: keys_outside(u) })}</p>;
+  const between = [
+    `ε max ${interval_text(u.strain.eps_max, 3)}`,
+    `${t('numbers.v_shear')} ${interval_text(u.clusters.shear.volume_mm3, 0, ' mm³')}`,
+    `${t('numbers.v_both')} ${interval_text(u.clusters.both.volume_mm3, 0, ' mm³')}`,
+  ];
+  const better = by_share(u).map(([key, share]) => `${key} ${format_percent(share)}`);
+  return (
+    <p class="certainty">
+      {`${t('uncertain.report')}: ${between.join('; ')}. `}
+      {better.length > 0 && `${t('uncertain.better')}: ${better.join(', ')}. `}
+      {t('uncertain.model_form', { error: u.model_form_error.eps_max })}
+    </p>
+  );
+}
+
 function Report(props: { of: Finished; name: string; parameters: Parameters; version: string }) {
   const { of, name, parameters, version } = props;
   const { risk, model } = of.result;
@@ -170,6 +193,7 @@ function Report(props: { of: Finished; name: string; parameters: Parameters; ver
         <Strain of={of} />
       </div>
       <Clusters of={of} skin_mm={parameters.skin_thickness_mm} />
+      <Certainty of={of} />
       <figure>
         <figcaption>{t('report.section')}</figcaption>
         <img src={section_path(of.id)} alt="" />
@@ -204,7 +228,10 @@ export function Reports(props: { documents: Finished[]; parameters: Parameters }
   const names = column_names(props.documents);
   const [version, set_version] = useState('');
   useEffect(() => {
-    get_version().then(set_version, () => undefined /* the report then names the model alone */);
+    get_version().then(
+      (v) => set_version(v.version),
+      () => undefined /* the report then names the model alone */,
+    );
   }, []);
   return (
     <div class="reports">

@@ -5,6 +5,7 @@
 import { format_fixed, format_percent, t } from '../i18n.js';
 import type { ClusterSet, Result } from '../types.js';
 import { Shape } from '../ui.js';
+import { given, interval_text } from './interval.js';
 import { share_of_muscle, tip_height, type Finished } from './quantities.js';
 
 function Force(props: { from: number | null; F: number }) {
@@ -37,10 +38,16 @@ function Where(props: { set: ClusterSet; tip: number }) {
   return <span class="more">{`${bodies(set)}, ${t('glance.where', { depth })}`}</span>;
 }
 
+/* What the uncertain measurements leave open. */
+function Between(props: { text: string }) {
+  return props.text ? <span class="more between">{props.text}</span> : null;
+}
+
 export function Glance(props: { of: Finished; skin_mm: number }) {
   const { result, parameters } = props.of;
   const { clusters, strain, numerics, threshold_force_N: force } = result;
   const { band } = result.risk;
+  const u = given(result);
   const F = parameters['F'] ?? 0;
   const tip = tip_height(props.of, props.skin_mm);
   return (
@@ -53,6 +60,7 @@ export function Glance(props: { of: Finished; skin_mm: number }) {
         <dt>{t('glance.shear', { threshold: clusters.shear.threshold ?? '' })}</dt>
         <dd>
           <Volume set={clusters.shear} result={result} />
+          <Between text={interval_text(u?.clusters.shear.volume_mm3, 0, '\u00a0mm³')} />
           <span class="more">
             <Force from={force.shear} F={F} />
           </span>
@@ -61,6 +69,7 @@ export function Glance(props: { of: Finished; skin_mm: number }) {
         <dt>{t('glance.compression', { threshold: clusters.compression.threshold ?? '' })}</dt>
         <dd>
           <Volume set={clusters.compression} result={result} />
+          <Between text={interval_text(u?.clusters.compression.volume_mm3, 0, '\u00a0mm³')} />
           <span class="more">
             <Force from={force.compression} F={F} />
           </span>
@@ -69,6 +78,7 @@ export function Glance(props: { of: Finished; skin_mm: number }) {
         <dt>{t('glance.both')}</dt>
         <dd>
           <Volume set={clusters.both} result={result} />
+          <Between text={interval_text(u?.clusters.both.volume_mm3, 0, '\u00a0mm³')} />
           <Where set={clusters.both} tip={tip} />
         </dd>
         <dt>{t('glance.axis')}</dt>
@@ -78,6 +88,7 @@ export function Glance(props: { of: Finished; skin_mm: number }) {
           <span class="more">
             {t('glance.axis.depth', { depth: format_fixed(strain.eps_max_depth_mm, 1) })}
           </span>
+          <Between text={interval_text(u?.strain.eps_max, 3)} />
         </dd>
       </dl>
     </div>

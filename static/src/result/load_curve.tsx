@@ -5,6 +5,7 @@
 import { format, format_fixed, t } from '../i18n.js';
 import type { LoadPoint, Result } from '../types.js';
 import { ticks } from './axis.js';
+import { given, interval_of, type Interval } from './interval.js';
 import type { Finished } from './quantities.js';
 
 const width = 340;
@@ -16,10 +17,13 @@ interface Panel {
   of: (p: LoadPoint) => number;
   threshold: number;
   crossed: number | null;
+  crossing: Interval | null; /* of the force, and of the strain at the measured force: */
+  strain: Interval | null; /* between 5 and 95 % of the samples */
 }
 
 function panels(r: Result): Panel[] {
   const { shear, compression } = r.clusters;
+  const u = given(r);
   return [
     {
       name: t('curve.shear'),
@@ -27,6 +31,8 @@ function panels(r: Result): Panel[] {
       of: (p) => p.E_shear_max,
       threshold: shear.threshold ?? 0,
       crossed: r.threshold_force_N.shear,
+      crossing: interval_of(u?.threshold_force_N.shear),
+      strain: interval_of(u?.strain.E_shear_max),
     },
     {
       name: t('curve.compression'),
@@ -34,11 +40,46 @@ function panels(r: Result): Panel[] {
       of: (p) => p.E_comp_max,
       threshold: compression.threshold ?? 0,
       crossed: r.threshold_force_N.compression,
+      crossing: interval_of(u?.threshold_force_N.compression),
+      strain: interval_of(u?.strain.E_comp_max),
     },
   ];
 }
 
 const panel_top = (i: number): number => plot.top + i * (plot.height + plot.gap);
+
+/* Bars with ends: along the threshold for the force that crosses it, upright at the measured force
+ * for the strain there. */
+function Bars(props: {
+  panel: Panel;
+  x: (F: number) => number;
+  y: (v: number) => number;
+  F: number;
+}) {
+  const { panel, x, y, F } = props;
+  const { crossing, strain } = panel;
+  const [at, level] = [x(F) - 4, y(panel.threshold)];
+  return (
+    <g class="interval">
+      {crossing && (
+        <path
+          d={
+            `M${x(crossing.low)} ${level}H${x(crossing.high)}` +
+            `M${x(crossing.low)} ${level - 4}v8M${x(crossing.high)} ${level - 4}v8`
+          }
+        />
+      )}
+      {strain && (
+        <path
+          d={
+            `M${at} ${y(strain.low)}V${y(strain.high)}` +
+            `M${at - 4} ${y(strain.low)}h8M${at - 4} ${y(strain.high)}h8`
+          }
+        />
+      )}
+    </g>
+  );
+}
 
 function PanelPlot(props: {
   panel: Panel;
@@ -47,7 +88,8 @@ function PanelPlot(props: {
   x: (F: number) => number;
 }) {
   const { panel, points, index, x } = props;
-  const max = Math.max(panel.threshold * 1.2, ...points.map(panel.of)) * 1.05;
+  const tops = [...points.map(panel.of), panel.strain?.high ?? 0];
+  const max = Math.max(panel.threshold * 1.2, ...tops) * 1.05;
   const top = panel_top(index);
   const bottom = top + plot.height;
   const y = (v: number): number => bottom - (v / max) * plot.height;
@@ -74,6 +116,7 @@ function PanelPlot(props: {
         {t('curve.threshold', { value: panel.threshold })}
       </text>
       <path class="line" d={line} />
+      <Bars panel={panel} x={x} y={y} F={points[points.length - 1]?.F_N ?? 0} />
       {panel.crossed !== null && (
         <g class="crossed">
           <path d={`M${x(panel.crossed)} ${y_threshold}V${bottom}`} />
@@ -167,7 +210,10 @@ export function LoadCurve(props: { of: Finished; side: string }) {
           {t('curve.measured', { F })}
         </text>
       </svg>
-      <Table points={points} />
+      <div>
+        {given(result) && <p class="hint">{t('uncertain.bars')}</p>}
+        <Table points={points} />
+      </div>
     </figure>
   );
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // One assessment, or two beside each other.
+import type { ComponentChildren } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import {
   document_path,
@@ -10,6 +11,7 @@ import {
   section_path,
   type Parameters,
 } from '../api.js';
+import { use_emulator } from '../emulator.js';
 import { Follower, has_ended, type Followed } from '../follow.js';
 import { format_time, language, t, t_or } from '../i18n.js';
 import { form_address } from '../router.js';
@@ -22,9 +24,11 @@ import { History } from './history.js';
 import { LoadCurve } from './load_curve.js';
 import { Numbers } from './numbers.js';
 import { Picture } from './picture.js';
-import { finished } from './quantities.js';
+import { finished, type Finished } from './quantities.js';
 import { Strips } from './strip.js';
+import { UncertaintyCard } from './uncertainty.js';
 import { NoResult, Running } from './waiting.js';
+import { WhatIfCard } from './what_if.js';
 
 const nothing_yet: Followed = { document: null, progress: null, lost: false, error: null };
 
@@ -115,6 +119,21 @@ function FigureCard(props: { of: Assessment | null; name: string }) {
   );
 }
 
+/* A card a side, left and right in their columns. */
+function EachSide(props: {
+  states: Followed[];
+  of: (done: Finished, index: number) => ComponentChildren;
+}) {
+  return (
+    <div class={`cards n${props.states.length}`}>
+      {props.states.map(({ document }, i) => {
+        const done = document ? finished([document])[0] : undefined;
+        return <div key={document?.id ?? i}>{done && props.of(done, i)}</div>;
+      })}
+    </div>
+  );
+}
+
 function Meta(props: { of: Assessment }) {
   const { of } = props;
   const parts = [
@@ -169,6 +188,7 @@ export function ResultPage(props: { ids: string[] }) {
     ? column_names(documents)
     : ids.map((_, i) => t('result.title') + numbered(i));
   use_announcement(complete ? states : [], names);
+  const emulator = use_emulator();
   const done = finished(documents);
   const inputs = parameters?.inputs ?? [];
   return (
@@ -205,6 +225,18 @@ export function ResultPage(props: { ids: string[] }) {
             <FigureCard key={ids[i]} of={state.document} name={names[i] ?? ''} />
           ))}
         </div>
+      )}
+      {done.some((d) => d.result.uncertainty) && (
+        <EachSide
+          states={states}
+          of={(d, i) => <UncertaintyCard of={d} inputs={inputs} side={names[i] ?? ''} />}
+        />
+      )}
+      {emulator && done.length > 0 && (
+        <EachSide
+          states={states}
+          of={(d, i) => <WhatIfCard of={d} inputs={inputs} side={names[i] ?? ''} />}
+        />
       )}
       <div class="lower">
         {done.length > 0 && <Numbers documents={done} inputs={inputs} />}

@@ -4,9 +4,10 @@
 // labelled pointer; the same in numbers beside it.
 import { format, format_fixed, t, type Key } from '../i18n.js';
 import { comparable_sides, type ReferenceSide } from '../reference.js';
-import type { Result } from '../types.js';
+import type { Quantiles, Result } from '../types.js';
 import { column_letters, column_names, side_letter } from '../ui.js';
 import { axis_of } from './axis.js';
+import { given, interval_of, type Interval } from './interval.js';
 import type { Finished } from './quantities.js';
 
 interface Metric {
@@ -14,6 +15,7 @@ interface Metric {
   decimals: number;
   of_reference: (s: ReferenceSide) => number;
   of_result: (r: Result) => number;
+  between: (r: Result) => Quantiles | undefined;
 }
 
 const metrics: readonly Metric[] = [
@@ -22,18 +24,21 @@ const metrics: readonly Metric[] = [
     decimals: 2,
     of_reference: (s) => s.eps_max,
     of_result: (r) => r.strain.eps_max,
+    between: (r) => given(r)?.strain.eps_max,
   },
   {
     key: 'strip.v_shear',
     decimals: 0,
     of_reference: (s) => s.volume_shear_mm3,
     of_result: (r) => r.clusters.shear.volume_mm3,
+    between: (r) => given(r)?.clusters.shear.volume_mm3,
   },
   {
     key: 'strip.v_both',
     decimals: 0,
     of_reference: (s) => s.volume_both_mm3,
     of_result: (r) => r.clusters.both.volume_mm3,
+    between: (r) => given(r)?.clusters.both.volume_mm3,
   },
 ];
 
@@ -41,9 +46,16 @@ const width = 460;
 const margin = 14;
 const line_y = 40;
 
-function Strip(props: { metric: Metric; reference: number[]; ours: number[]; letters: string[] }) {
-  const { metric, reference, ours, letters } = props;
-  const { from, to, marks } = axis_of([...reference, ...ours], 5);
+function Strip(props: {
+  metric: Metric;
+  reference: number[];
+  ours: number[];
+  bars: (Interval | null)[];
+  letters: string[];
+}) {
+  const { metric, reference, ours, bars, letters } = props;
+  const ends = bars.flatMap((b) => (b ? [b.low, b.high] : []));
+  const { from, to, marks } = axis_of([...reference, ...ours, ...ends], 5);
   const x = (v: number): number => margin + ((v - from) / (to - from)) * (width - 2 * margin);
   const highest = ours.indexOf(
     Math.max(...ours),
@@ -66,6 +78,7 @@ function Strip(props: { metric: Metric; reference: number[]; ours: number[]; let
       ))}
       {ours.map((v, i) => (
         <g key={i} class={`ours n${i}`}>
+          <Bar of={bars[i] ?? null} index={i} x={x} />
           <path d={`M${x(v)} ${line_y - 6}l-6 -10h12z`} />
           <text
             x={x(v)}
@@ -81,17 +94,30 @@ function Strip(props: { metric: Metric; reference: number[]; ours: number[]; let
   );
 }
 
+/* Between 5 and 95 % of the samples of uncertain measurements. */
+function Bar(props: { of: Interval | null; index: number; x: (v: number) => number }) {
+  if (!props.of) return null;
+  const [a, b] = [props.x(props.of.low), props.x(props.of.high)];
+  const y =
+    line_y + (props.index ? 4 : -4); /* two sides beside each other, not one over the other */
+  return <path class="interval" d={`M${a} ${y}H${b}M${a} ${y - 3}v6M${b} ${y - 3}v6`} />;
+}
+
 const median = (sorted: number[]): number => {
   const half = sorted.length / 2;
   const [a = 0, b = 0] = [sorted[Math.ceil(half) - 1], sorted[Math.floor(half)]];
   return (a + b) / 2;
 };
 
+const between = (bar: Interval | null, number: (v: number) => string): string =>
+  bar ? ` (${number(bar.low)} – ${number(bar.high)})` : '';
+
 function Row(props: { metric: Metric; sides: ReferenceSide[]; documents: Finished[] }) {
   const { metric, sides, documents } = props;
   const reference = sides.map(metric.of_reference);
   const sorted = [...reference].sort((a, b) => a - b);
   const ours = documents.map((d) => metric.of_result(d.result));
+  const bars = documents.map((d) => interval_of(metric.between(d.result)));
   const number = (v: number): string => format_fixed(v, metric.decimals);
   const names = column_names(documents);
   return (
@@ -101,6 +127,7 @@ function Row(props: { metric: Metric; sides: ReferenceSide[]; documents: Finishe
         metric={metric}
         reference={reference}
         ours={ours}
+        bars={bars}
         letters={column_letters(documents)}
       />
       <table class="numbers small">
@@ -115,7 +142,7 @@ function Row(props: { metric: Metric; sides: ReferenceSide[]; documents: Finishe
           {ours.map((v, i) => (
             <tr key={i} class="ours">
               <th scope="row">{names[i]}</th>
-              <td>{number(v)}</td>
+              <td>{number(v) + between(bars[i] ?? null, number)}</td>
               <td>
                 {t('strip.rank.of', {
                   below: reference.filter((r) => r < v).length,
@@ -174,7 +201,10 @@ export function Strips(props: { documents: Finished[] }) {
   return (
     <section class="panel-box strips" aria-labelledby="strips">
       <h2 id="strips">{t('strip.title', { n: sides.length })}</h2>
-      <p class="hint">{t('strip.note')}</p>
+      <p class="hint">
+        {t('strip.note')}
+        {props.documents.some((d) => given(d.result)) && ` ${t('uncertain.bars')}`}
+      </p>
       {metrics.map((metric) => (
         <Row key={metric.key} metric={metric} sides={sides} documents={props.documents} />
       ))}
