@@ -7,7 +7,8 @@ usage: capacity.py [--check] [NAME=VALUE...]    --check only compares; capacity.
 
 An assessment goes: accepted (a transaction) -> waits, clinics before studies -> claimed (a
 transaction) -> solved on one core -> stored (a transaction, with its field) -> read. Transactions
-share the database, which commits many at once but one group after the other. Time is in seconds.
+of one machine that wait together share a commit; the machines take turns, one commit at a time
+(docs/decisions/0014-a-store-for-many-machines.md). Time is in seconds.
 """
 import heapq
 import math
@@ -24,16 +25,17 @@ FIGURES = {
     "solve_s": (5.0, "CPU s", "one standard solve; README, `ischia solve examples/table2_1R.json`"),
     "solve_spread": (0.35, "", "standard deviation over mean of solves; the sides of Table 2"),
     "commit_ms": (2.0, "ms", "one group commit of the database with its disk; assumed, `pg_test_fsync` measures it"),
-    "group": (32, "", "transactions that share a commit at most; with the two times that is 4 700 a second, "
-                      "and `bench_service.py` measured 4 660"),
-    "transaction_ms": (0.15, "ms", "work of the database for a transaction; from the same measurement"),
+    "group": (64, "", "transactions of one machine that share a commit at most; server/store/store_postgresql.c"),
+    "transaction_ms": (0.5, "ms", "work of the database for a transaction while the others wait; 1 000 assessments a "
+                                  "second, each with its audit row, by `bench_fleet.py`"),
     "transactions": (4, "", "of an assessment: accepted, claimed, stored, audited"),
     "reads": (20, "", "requests that read an assessment, its events and pages; assumed"),
     "read_ms": (0.02, "ms", "a read by the daemon; 57 000 a second by `bench_service.py`"),
     "store_kB": (25, "kB", "an assessment in the store, its field included; 12 sides of Table 2"),
     "cores": (16, "", "cores of a machine, one left for the daemon"),
     "wait_s": (10, "s", "longest wait that a clinic accepts for 19 in 20, before the solve itself"),
-    "lease_s": (15, "s", "after which the solves of a machine that died are somebody else's"),
+    "lease_s": (7, "s", "after which the solves of a machine that died are somebody else's; 5.1 s to 6.9 s by "
+                        "`cut_network.py`"),
     "core_hour": (0.04, "EUR", "a core for an hour, rented; assumed"),
     "GB_month": (0.12, "EUR", "a GB of the store for a month, with its copies; assumed"),
 }
@@ -55,23 +57,31 @@ def percentile(values, part):
 
 
 class Database:
-    """Group commit: what has come while one group was written makes up the next."""
+    """Group commit, one machine's group after another's: what a machine has waiting when its turn
+    comes makes up its group."""
 
     def __init__(self, plan, figures):
         self.plan, self.figures = plan, figures
-        self.waiting, self.busy, self.busy_s, self.waits = deque(), False, 0.0, []
+        self.waiting, self.turns = {}, deque()  # of each machine; machines with something to write
+        self.busy, self.busy_s, self.waits = False, 0.0, []
 
-    def ask(self, now, then):
-        self.waiting.append((now, then))
+    def ask(self, now, machine, then):
+        queue = self.waiting.setdefault(machine, deque())
+        if not queue:
+            self.turns.append(machine)
+        queue.append((now, then))
         if not self.busy:
             self.commit(now)
 
     def commit(self, now):
-        batch = [self.waiting.popleft()
-                 for _ in range(min(len(self.waiting), int(self.figures["group"])))]
-        self.busy = bool(batch)
-        if not batch:
+        self.busy = bool(self.turns)
+        if not self.turns:
             return
+        machine = self.turns.popleft()
+        queue = self.waiting[machine]
+        batch = [queue.popleft() for _ in range(min(len(queue), int(self.figures["group"])))]
+        if queue:
+            self.turns.append(machine)
         took = (self.figures["commit_ms"] + len(batch) * self.figures["transaction_ms"]) / 1e3
         self.busy_s += took
         self.plan(now + took, self.committed, batch)
@@ -88,7 +98,10 @@ class Hour:
     and give their solves back a lease later."""
 
     def __init__(self, figures, sides_per_hour, workers, dies=0, seed=1):
-        self.figures, self.free, self.random = figures, workers, random.Random(seed)
+        self.figures, self.random = figures, random.Random(seed)
+        per_machine = int(figures["cores"] - 1)
+        self.machines = max(1, math.ceil(workers / per_machine))
+        self.free = deque(i // per_machine for i in range(workers))  # whose each free core is
         self.pair_rate = sides_per_hour / 2 / 3600
         self.events, self.count = [], 0
         self.database = Database(self.plan, figures)
@@ -97,8 +110,8 @@ class Hour:
         spread = self.figures["solve_spread"]
         self.sigma = math.sqrt(math.log(1 + spread * spread))
         self.mu = math.log(figures["solve_s"]) - self.sigma ** 2 / 2
-        self.lost = dies * int(figures["cores"] - 1)
-        self.now = 0.0
+        self.dying = set(range(dies))
+        self.dead, self.solving, self.now = set(), {}, 0.0
 
     def plan(self, at, what, *arguments):
         self.count += 1
@@ -106,7 +119,7 @@ class Hour:
 
     def run(self):
         self.plan(0.0, self.arrive)
-        if self.lost:
+        if self.dying:
             self.plan(self.end_s / 2, self.machine_dies)
         while self.events:
             self.now, _, what, arguments = heapq.heappop(self.events)
@@ -118,9 +131,10 @@ class Hour:
     def arrive(self, now):
         for _ in range(2):
             self.arrived += 1
-            self.database.ask(now, self.accepted)
-        for _ in range(2 * (int(self.figures["transactions"]) - 3)):
-            self.database.ask(now, lambda _: None)
+            machine = self.random.randrange(self.machines)
+            self.database.ask(now, machine, self.accepted)
+            for _ in range(int(self.figures["transactions"]) - 3):
+                self.database.ask(now, machine, lambda _: None)
         self.plan(now + self.random.expovariate(self.pair_rate), self.arrive)
 
     def accepted(self, now):
@@ -128,28 +142,34 @@ class Hour:
         self.claim(now)
 
     def claim(self, now):
-        while self.free > 0 and self.queue:
-            self.free -= 1
-            waited_from = self.queue.popleft()
-            self.database.ask(now, lambda at, since=waited_from: self.claimed(at, since))
+        while self.free and self.queue:
+            machine, since = self.free.popleft(), self.queue.popleft()
+            self.database.ask(now, machine, lambda at, m=machine, s=since: self.claimed(at, m, s))
 
-    def claimed(self, now, since):
+    def claimed(self, now, machine, since):
         self.queue_waits.append(now - since)
-        self.plan(now + self.random.lognormvariate(self.mu, self.sigma), self.solved)
+        self.plan(now + self.random.lognormvariate(self.mu, self.sigma), self.solved, machine)
+        self.solving[machine] = self.solving.get(machine, 0) + 1
 
-    def solved(self, now):
-        self.database.ask(now, self.stored)
+    def solved(self, now, machine):
+        if machine in self.dead:
+            return
+        self.solving[machine] -= 1
+        self.database.ask(now, machine, lambda at: self.stored(at, machine))
 
-    def stored(self, now):
+    def stored(self, now, machine):
         self.ends += 1
-        self.free += 1
+        if machine not in self.dead:
+            self.free.append(machine)
         self.claim(now)
 
     def machine_dies(self, now):
-        """Its cores are gone at once; what they solved waits again when the lease is over."""
-        self.free -= self.lost
-        for _ in range(self.lost):
-            self.plan(now + self.figures["lease_s"], self.accepted)
+        """Its cores are gone at once."""
+        self.dead = self.dying
+        self.free = deque(machine for machine in self.free if machine not in self.dead)
+        for machine in self.dead:  # what they solved waits again when the lease is over
+            for _ in range(self.solving.get(machine, 0)):
+                self.plan(now + self.figures["lease_s"], self.accepted)
 
     def wait_s(self, part=0.95):
         return percentile(self.queue_waits, part)
@@ -246,8 +266,9 @@ def page(figures):
     """CAPACITY.md with its tables made anew; what stands between them is left alone."""
     broke, at = break_table(figures)
     limit = database_limit(figures)
-    sentence = [f"With these figures the database is full at about {limit:.0f} assessments a second "
-                f"({limit * figures['solve_s']:.0f} cores that solve); the simulation stopped at {at:g}."]
+    sentence = [f"With these figures the turn to write is never free at {at:g} assessments a second "
+                f"({at * figures['solve_s']:.0f} cores that solve), where the simulation stopped; with every "
+                f"group full the database would end at about {limit:.0f}."]
     tables = {"figures": figures_table(figures), "places": places_table(figures),
               "break": broke + [""] + sentence, "solves": solve_table(figures)}
     text = PAGE.read_text(encoding="utf-8")

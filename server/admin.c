@@ -24,7 +24,10 @@ const char admin_help[] =
     "  outbox retry          Makes all of it due now, also what was given up.\n"
     "  backup FILE           Copies the whole store into a new file, while the daemon runs or "
     "not.\n"
-    "  restore FILE          Replaces the content of the store by that of a backup.\n";
+    "  restore FILE          Replaces the content of the store by that of a backup.\n"
+    "  store migrate --from STORE --to STORE\n"
+    "      Copies everything into an empty store, while no daemon uses either. A STORE is\n"
+    "      sqlite:DIRECTORY or postgresql://USER@HOST/DATABASE.\n";
 
 static int complain(const struct ischia_error *err)
 {
@@ -231,6 +234,62 @@ static enum ischia_code run_command(const struct config *config, const struct co
     return code;
 }
 
+/* ---------------------------------------------------- commands that open no store first */
+
+static enum ischia_code note(const char *where, const char *what, struct ischia_error *err)
+{
+    const struct store_options options = {.location = where, .mode = STORE_ADMIN};
+    const struct store_audit row = {
+        .who = "admin", .what = what, .subject = "", .outcome = "ok", .detail = ""};
+    struct store *store = NULL;
+    TRY(store_open(&options, &store, err));
+    const enum ischia_code code = store_audit_append(store, &row, err);
+    store_close(store);
+    return code;
+}
+
+static enum ischia_code restore(const struct config *config, char *const *words,
+                                struct ischia_error *err)
+{
+    return store_restore(location(config), words[0], err);
+}
+
+static enum ischia_code migrate(const struct config *config, char *const *words,
+                                struct ischia_error *err)
+{
+    int64_t rows = 0;
+    (void)config;
+    TRY(store_move(words[0], words[1], &rows, err));
+    TRY(note(words[1], "store.migrate", err));
+    (void)printf("%lld rows\n", (long long)rows);
+    return ISCHIA_OK;
+}
+
+static const struct {
+    const char *noun, *verb; /* verb NULL: none */
+    int words;
+    enum ischia_code (*run)(const struct config *config, char *const *words,
+                            struct ischia_error *err);
+} closed_commands[] = {
+    {"restore", NULL, 1, restore},
+    {"store", "migrate", 2, migrate},
+};
+
+/* False: it is none of these. */
+static bool run_closed(const struct config *config, char *const *words, int count,
+                       enum ischia_code *ret_code, struct ischia_error *err)
+{
+    for (size_t i = 0; i < sizeof closed_commands / sizeof closed_commands[0]; i++) {
+        const int used = closed_commands[i].verb == NULL ? 1 : 2;
+        if (count != used + closed_commands[i].words) continue;
+        if (strcmp(words[0], closed_commands[i].noun) != 0) continue;
+        if (used == 2 && strcmp(words[1], closed_commands[i].verb) != 0) continue;
+        *ret_code = closed_commands[i].run(config, words + used, err);
+        return true;
+    }
+    return false;
+}
+
 static const struct command *find_command(char *const *words, int count, int *ret_used)
 {
     for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
@@ -249,10 +308,9 @@ int admin_run(const struct config *config, char *const *words, int count)
 {
     struct ischia_error err;
     int used = 0;
-    if (count == 2 && strcmp(words[0], "restore") == 0) {
-        if (store_restore(location(config), words[1], &err) != ISCHIA_OK) return complain(&err);
-        return ADMIN_OK;
-    }
+    enum ischia_code code = ISCHIA_OK;
+    if (run_closed(config, words, count, &code, &err))
+        return code == ISCHIA_OK ? ADMIN_OK : complain(&err);
     const struct command *command = find_command(words, count, &used);
     if (command == NULL) {
         (void)fprintf(stderr, "ischiad: no such command, or not with these words. Commands:\n%s",

@@ -39,7 +39,9 @@ const struct config_option config_options[] = {
          "Address and port to answer on; port 0 takes a free one. Anything but the loopback "
          "address needs tokens and TLS, or behind_proxy."),
     TEXT(state_dir, "/var/lib/ischia", "Directory of the database; nothing else is written."),
-    TEXT(store, "", "Where the store is; empty: in the state directory."),
+    TEXT(store, "",
+         "Where the store is: a directory, or postgresql://USER@HOST/DATABASE for any number of "
+         "daemons; empty: in the state directory."),
     NUMBER("workers", workers, "processes", 0, 1024, "0", false,
            "Worker processes that solve side by side; 0: one a processor core."),
     TEXT(worker_program, "",

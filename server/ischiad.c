@@ -31,6 +31,7 @@
  */
 
 enum { EXIT_USAGE = 2, TICK_MS = 1000, RETIRE_EVERY_S = 60, RETIRE_BATCH = 200 };
+enum { DATABASE_PATIENCE_S = 60 };
 enum { SWEEP_AGE_MS = 5 * 60 * 1000 };
 
 struct daemon {
@@ -54,6 +55,7 @@ struct arguments {
     int flag_count;
     char **words;
     int word_count;
+    char *from, *to; /* of `store migrate`; NULL: not given */
     enum action action;
 };
 
@@ -107,6 +109,10 @@ static int parse_flag(struct arguments *ret, char **argv, int left, struct ischi
         ret->config_path = value;
         return used;
     }
+    if (strcmp(name, "from") == 0 || strcmp(name, "to") == 0) {
+        *(name[0] == 'f' ? &ret->from : &ret->to) = value;
+        return used;
+    }
     ret->flags[2 * ret->flag_count] = name;
     ret->flags[2 * ret->flag_count + 1] = value;
     ret->flag_count++;
@@ -128,6 +134,9 @@ static enum ischia_code parse_arguments(struct arguments *ret, int argc, char **
         if (used == 0) return err->code;
         i += used;
     }
+    /* they took two words each */
+    if (ret->from != NULL) ret->words[ret->word_count++] = ret->from;
+    if (ret->to != NULL) ret->words[ret->word_count++] = ret->to;
     return ISCHIA_OK;
 }
 
@@ -227,6 +236,26 @@ static void find_worker(struct daemon *d)
     }
 }
 
+/* A database server may come up after us, after a power cut say. SIGTERM and SIGINT, which are
+ * blocked, end the wait; run is not reached then. */
+static enum ischia_code open_patiently(const struct store_options *options, struct store **ret,
+                                       struct ischia_error *err)
+{
+    const struct timespec pause = {.tv_sec = 1};
+    const int patience_s = store_is_on_server(options->location) ? DATABASE_PATIENCE_S : 0;
+    sigset_t ends;
+    struct log_value detail;
+    (void)sigemptyset(&ends);
+    (void)sigaddset(&ends, SIGTERM);
+    (void)sigaddset(&ends, SIGINT);
+    for (int waited_s = 0;; waited_s++) {
+        const enum ischia_code code = store_open(options, ret, err);
+        if (code != ISCHIA_E_IO || waited_s >= patience_s) return code;
+        LOG_WARNING("waiting for the database", "detail=%s", log_quote(&detail, err->message));
+        if (sigtimedwait(&ends, NULL, &pause) > 0) return code;
+    }
+}
+
 static enum ischia_code open_store(struct daemon *d, struct ischia_error *err)
 {
     const struct config *config = &d->service.config;
@@ -235,7 +264,7 @@ static enum ischia_code open_store(struct daemon *d, struct ischia_error *err)
         .mode = STORE_SERVE,
         .idempotency_ms = (int64_t)config->idempotency_hours * 3600 * 1000,
     };
-    return store_open(&options, &d->service.store, err);
+    return open_patiently(&options, &d->service.store, err);
 }
 
 /* The one that was asked for must be good; one that came with the program and does not fit it only

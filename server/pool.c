@@ -20,6 +20,7 @@
 #include "server/pool_worker.h"
 
 struct cancel {
+    bool all;
     struct uuid id;
     struct cancel *next;
 };
@@ -420,8 +421,8 @@ static void cancel_all(struct pool *pool, struct cancel *cancels)
         cancels = cancel->next;
         for (int i = 0; i < pool->worker_count; i++) {
             struct worker *worker = &pool->worker[i];
-            if (worker->has_job && uuid_equal(&worker->job.id, &cancel->id))
-                kill_worker(worker, KILLED_CANCEL, "cancelled");
+            const bool meant = cancel->all || uuid_equal(&worker->job.id, &cancel->id);
+            if (worker->has_job && meant) kill_worker(worker, KILLED_CANCEL, "cancelled");
         }
         free(cancel);
     }
@@ -690,16 +691,24 @@ void pool_wake(struct pool *pool)
     if (!was_wanted) wake_thread(pool);
 }
 
-void pool_cancel(struct pool *pool, const struct uuid *id)
+static void add_cancel(struct pool *pool, struct cancel what)
 {
     struct cancel *cancel = malloc(sizeof *cancel);
     if (cancel == NULL) return; /* the solve runs on; the store refuses what comes of it */
     (void)pthread_mutex_lock(&pool->lock);
-    *cancel = (struct cancel){.id = *id, .next = pool->cancels};
+    what.next = pool->cancels;
+    *cancel = what;
     pool->cancels = cancel;
     (void)pthread_mutex_unlock(&pool->lock);
     wake_thread(pool);
 }
+
+void pool_cancel(struct pool *pool, const struct uuid *id)
+{
+    add_cancel(pool, (struct cancel){.id = *id});
+}
+
+void pool_cancel_all(struct pool *pool) { add_cancel(pool, (struct cancel){.all = true}); }
 
 /* NULL when there is no memory. */
 static struct render *make_render(const char *case_json, const unsigned char *field,

@@ -123,6 +123,9 @@ void pool_wake(struct pool *pool);
  * nothing happens. Any thread, does not wait. */
 void pool_cancel(struct pool *pool, const struct uuid *id);
 
+/* The same for every job that is with a worker now. */
+void pool_cancel_all(struct pool *pool);
+
 enum pool_render_kind { POOL_RENDER_VTU, POOL_RENDER_SVG, POOL_RENDER_KIND_COUNT };
 extern const char *const pool_render_names[POOL_RENDER_KIND_COUNT]; /* "vtu", "svg" */
 

@@ -273,6 +273,15 @@ static void on_cached(void *context, const struct uuid *id)
     publish_state(context, id, QUEUE_SUCCEEDED);
 }
 
+/* The store failed in a claim; it may have been made all the same (the connection to a server was
+ * lost in the commit). Then it is given back as soon as the store listens again. */
+static void give_back(struct queue *queue, const struct uuid *id, int64_t line, int64_t attempt)
+{
+    struct verdict verdict = {
+        .id = *id, .line = line, .attempt = attempt, .to = QUEUE_QUEUED, .end = POOL_DRAINED};
+    if (attempt > 0) owe(queue, &verdict);
+}
+
 /* When nobody waits for an assessment. */
 static bool next_point(struct queue *queue, struct pool_job *ret)
 {
@@ -281,6 +290,7 @@ static bool next_point(struct queue *queue, struct pool_job *ret)
     enum store_answer answer = STORE_NOT_FOUND;
     if (store_study_claim_next(queue->store, &claim, &answer, &err) != ISCHIA_OK) {
         report_store_error(queue, &err);
+        give_back(queue, &claim.study, claim.line, claim.attempt);
         return false;
     }
     if (answer != STORE_DONE) return false;
@@ -313,6 +323,7 @@ static bool next_job(void *context, struct pool_job *ret)
     if (!pay_what_is_owed(queue)) return false; /* a solve that cannot be kept is a waste */
     if (store_claim_next(queue->store, on_cached, queue, &claim, &answer, &err) != ISCHIA_OK) {
         report_store_error(queue, &err);
+        give_back(queue, &claim.id, 0, claim.attempt);
         return false;
     }
     if (answer != STORE_DONE) return next_point(queue, ret);
@@ -337,6 +348,12 @@ static void on_progress(void *context, const struct pool_job *job,
                           .F_N = progress->F_N};
     (void)snprintf(event.message, sizeof event.message, "%s", progress->message);
     events_publish(queue->events, &job->id, &event);
+    struct store_progress told = {.fraction = progress->fraction,
+                                  .load_step = progress->load_step,
+                                  .newton_iteration = progress->newton_iteration,
+                                  .F_N = progress->F_N};
+    (void)snprintf(told.message, sizeof told.message, "%s", progress->message);
+    store_tell_progress(queue->store, &job->id, &told);
 }
 
 static void on_note(void *context, const struct pool_note *note)
@@ -351,6 +368,51 @@ static void on_tick(void *context)
     (void)pay_what_is_owed(queue);
     events_sweep(queue->events, EVENTS_AGE_MS);
 }
+
+/* ----------------------------------------------------------------- what other daemons do */
+
+static const enum queue_state state_after[STORE_CHANGE_KIND_COUNT] = {
+    [STORE_CHANGE_CREATED] = QUEUE_QUEUED,     [STORE_CHANGE_STARTED] = QUEUE_RUNNING,
+    [STORE_CHANGE_REQUEUED] = QUEUE_QUEUED,    [STORE_CHANGE_SUCCEEDED] = QUEUE_SUCCEEDED,
+    [STORE_CHANGE_FAILED] = QUEUE_FAILED,      [STORE_CHANGE_CANCELLED] = QUEUE_CANCELLED,
+    [STORE_CHANGE_ERASED] = QUEUE_STATE_COUNT,
+};
+
+/* As if it had happened here: those who wait and watch here are told, and what runs here of it (it
+ * was cancelled, or given to another) ends. */
+static void on_change(void *context, const struct store_change *change)
+{
+    struct queue *queue = context;
+    const enum queue_state state = state_after[change->kind];
+    if (state == QUEUE_QUEUED) pool_wake(queue->pool);
+    if (state == QUEUE_CANCELLED) pool_cancel(queue->pool, &change->id);
+    if (change->kind != STORE_CHANGE_CREATED && change->kind != STORE_CHANGE_ERASED)
+        publish_state(queue, &change->id, state);
+}
+
+static void on_progress_elsewhere(void *context, const struct uuid *id,
+                                  const struct store_progress *progress)
+{
+    struct queue *queue = context;
+    struct event event = {.kind = EVENT_PROGRESS,
+                          .state = QUEUE_RUNNING,
+                          .fraction = progress->fraction,
+                          .load_step = progress->load_step,
+                          .newton_iteration = progress->newton_iteration,
+                          .F_N = progress->F_N};
+    (void)snprintf(event.message, sizeof event.message, "%s", progress->message);
+    events_publish(queue->events, id, &event);
+}
+
+static void on_work(void *context) { pool_wake(((struct queue *)context)->pool); }
+
+static void on_study_cancelled(void *context, const struct uuid *id)
+{
+    pool_cancel(((struct queue *)context)->pool, id);
+}
+
+/* What this daemon runs may run elsewhere by now, and would be refused. */
+static void on_lease_lost(void *context) { pool_cancel_all(((struct queue *)context)->pool); }
 
 /* ----------------------------------------------------------------------- create, destroy */
 
@@ -377,9 +439,17 @@ static enum ischia_code start(struct queue *queue, const struct pool_options *op
                                    .on_outcome = on_outcome,
                                    .on_note = on_note,
                                    .on_tick = on_tick};
+    const struct store_watcher watcher = {.context = queue,
+                                          .on_change = on_change,
+                                          .on_progress = on_progress_elsewhere,
+                                          .on_work = on_work,
+                                          .on_study_cancelled = on_study_cancelled,
+                                          .on_lease_lost = on_lease_lost};
     int requeued;
     TRY(store_recover(queue->store, &requeued, err));
-    return pool_create(options, &host, &queue->pool, err);
+    TRY(pool_create(options, &host, &queue->pool, err));
+    store_watch(queue->store, &watcher);
+    return ISCHIA_OK;
 }
 
 enum ischia_code queue_create(struct store *store, struct events *events,
@@ -432,6 +502,7 @@ void queue_destroy(struct queue *queue, int grace_ms)
 {
     if (queue == NULL) return;
     atomic_store(&queue->draining, true);
+    store_watch(queue->store, NULL);
     wait_for_arrivals(queue);
     pool_destroy(queue->pool, grace_ms);
     (void)pay_what_is_owed(queue);

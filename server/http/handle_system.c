@@ -149,6 +149,7 @@ void handle_version(struct call *call, struct http_response *ret)
     json_put_integer(&out, "version", ISCHIA_MODEL_VERSION);
     json_close_object(&out);
     json_open_object(&out, "libraries");
+    json_put_string(&out, "store", store_engine(call->service->store));
     for (const struct version *v = versions(); v->name != NULL; v++)
         json_put_string(&out, v->name, v->text());
     json_close_object(&out);

@@ -10,20 +10,14 @@
 #include "server/http/http.h"
 #include "server/http/tls.h"
 #include "server/outbound/web.h"
-#include "server/store/store.h"
 
 const struct version *versions(void)
 {
     static const struct version rows[] = {
-        {"store", store_engine},
-        {"libmicrohttpd", http_library_version},
-        {"GnuTLS", tls_library_version},
-        {"libsodium", sodium_version_string},
-        {"zlib", zlibVersion},
-        {"libcurl", web_library_version},
-        {"cJSON", json_library_version},
-        {"glibc", gnu_get_libc_version},
-        {NULL, NULL},
+        {"libmicrohttpd", http_library_version}, {"GnuTLS", tls_library_version},
+        {"libsodium", sodium_version_string},    {"zlib", zlibVersion},
+        {"libcurl", web_library_version},        {"cJSON", json_library_version},
+        {"glibc", gnu_get_libc_version},         {NULL, NULL},
     };
     return rows;
 }

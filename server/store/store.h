@@ -15,6 +15,10 @@
  * keys, the change log, tokens and the audit chain. Nothing in this header knows the engine behind
  * it.
  *
+ * Any number of daemons on any machines may share a store on a server. Each holds a lease on what
+ * it runs for as long as it says every second that it lives; what belongs to nobody alive goes back
+ * into the queue within STORE_LEASE_MS and some, and whoever ran it can then no longer end it.
+ *
  * Threads: every function may be called from any thread at any time between open and close. Writes
  * are carried out by one thread of the store, which puts all that are waiting into one transaction;
  * a write returns (or calls back) only after the commit that makes it survive a power cut, so a
@@ -23,7 +27,9 @@
  * Times are Unix milliseconds, UTC; 0 means "not yet" or "never". Text is UTF-8; NULL means absent.
  *
  * Errors common to all: ISCHIA_E_IO when the engine cannot read or write (disk full, read-only,
- * out of descriptors; the engine's words are in the message): nothing of that call is kept.
+ * out of descriptors; the engine's words are in the message): nothing of that call is kept, unless
+ * the connection to a server was lost in the very commit: then nobody knows, and asking again with
+ * the same idempotency key, or attempt, is safe.
  * ISCHIA_E_MEMORY. ISCHIA_E_STATE after store_close has begun. Things that callers are expected to
  * meet (not found, conflict, queue full) are not errors: they are answers, in an enum.
  */
@@ -31,8 +37,10 @@
 struct store;
 
 enum { STORE_DIGEST_BYTES = 32 };
+enum { STORE_PROGRESS_BYTES = 96 };
 enum { STORE_LIST_LIMIT_MAX = 500, STORE_CURSOR_BYTES = 40 };
 enum { STORE_IDEMPOTENCY_MS = 24 * 60 * 60 * 1000 }; /* the default */
+enum { STORE_LEASE_MS = 5000, STORE_BEAT_MS = 1000 };
 
 enum store_answer {
     STORE_DONE,
@@ -49,7 +57,8 @@ enum store_mode {
 };
 
 struct store_options {
-    const char *location; /* the state directory; the engine chooses the names inside      */
+    const char *location; /* a directory, also as sqlite:DIRECTORY: one file in it, for one daemon;
+                             or postgresql://...: a server, for any number of daemons       */
     enum store_mode mode;
     int busy_timeout_ms;     /* how long to wait for another process' write; 0: 5000          */
     int64_t idempotency_ms;  /* how long an idempotency key is remembered; 0: 24 h            */
@@ -227,7 +236,9 @@ struct store_claim {
 
 /* Takes the first queued job (highest priority, then oldest): queued -> running. A queued job whose
  * case has been solved meanwhile is finished from that result on the way (told to on_cached, on the
- * calling thread, after the commit). STORE_NOT_FOUND when nothing is left to solve. */
+ * calling thread, after the commit). STORE_NOT_FOUND when nothing is left to solve. On an error
+ * ret->attempt other than 0 says that ret->id may have been claimed all the same: then the caller
+ * owes a store_requeue of it. */
 ISCHIA_MUST_CHECK enum ischia_code
 store_claim_next(struct store *store, void (*on_cached)(void *context, const struct uuid *id),
                  void *context, struct store_claim *ret, enum store_answer *ret_answer,
@@ -254,13 +265,15 @@ ISCHIA_MUST_CHECK enum ischia_code
 store_cancel(struct store *store, const struct uuid *id, enum queue_state *ret_was,
              enum store_answer *ret_answer, struct ischia_error *err);
 
-/* At start, before the first claim: every running -> queued, attempts and crashes kept. */
+/* At start, before the first claim: every running one that no living daemon holds -> queued,
+ * attempts and crashes kept. */
 ISCHIA_MUST_CHECK enum ischia_code store_recover(struct store *store, int *ret_requeued,
                                                  struct ischia_error *err);
 
 /* Erases an assessment, its idempotency keys, and its result and field unless another assessment
- * of the same case still uses them. The bytes are overwritten, in the log of the engine too; the
- * change log keeps the id and "erased". STORE_CONFLICT while it runs. */
+ * of the same case still uses them. In a file the bytes are overwritten, in its log too; on a
+ * server they go when that cleans up. The change log keeps the id and "erased". STORE_CONFLICT
+ * while it runs. */
 ISCHIA_MUST_CHECK enum ischia_code store_erase(struct store *store, const struct uuid *id,
                                                enum store_answer *ret_answer,
                                                struct ischia_error *err);
@@ -431,6 +444,40 @@ store_audit_verify(struct store *store, struct store_audit_report *ret, struct i
 enum { STORE_LATENCY_BUCKETS = 12 };
 extern const double store_latency_bound_ms[STORE_LATENCY_BUCKETS - 1];
 
+/* ----------------------------------------------------------------- what other daemons do */
+
+struct store_progress {
+    double fraction;
+    int load_step, newton_iteration;
+    double F_N;
+    char message[STORE_PROGRESS_BYTES];
+};
+
+/* Called on a thread of the store: be quick; only pool_wake, pool_cancel and events are for them.
+ * Any may be NULL. */
+struct store_watcher {
+    void *context;
+    /* Another daemon made this change; in order of seq, none left out, within a second or so. */
+    void (*on_change)(void *context, const struct store_change *change);
+    /* How far another daemon's solve is; some are left out. */
+    void (*on_progress)(void *context, const struct uuid *id,
+                        const struct store_progress *progress);
+    /* There may be new work, of any kind. */
+    void (*on_work)(void *context);
+    /* A study was cancelled by another daemon. May be missed: what comes of it is refused then. */
+    void (*on_study_cancelled)(void *context, const struct uuid *id);
+    /* The lease on all that this daemon runs was lost: others may be solving it. */
+    void (*on_lease_lost)(void *context);
+};
+
+/* From now on the watcher is told; *watcher is copied. NULL: no longer, and when this returns none
+ * of its functions is running. Does nothing where no other daemon can be. */
+void store_watch(struct store *store, const struct store_watcher *watcher);
+
+/* Tells the watchers of other daemons; the latest of each id, a few times a second. */
+void store_tell_progress(struct store *store, const struct uuid *id,
+                         const struct store_progress *progress);
+
 struct store_stats {
     int64_t count[QUEUE_STATE_COUNT]; /* assessments by state                                 */
     int64_t oldest_queued_ms;         /* created_ms of the oldest queued; 0: none             */
@@ -460,8 +507,18 @@ ISCHIA_MUST_CHECK enum ischia_code store_backup(struct store *store, const char 
 ISCHIA_MUST_CHECK enum ischia_code store_restore(const char *location, const char *backup_path,
                                                  struct ischia_error *err);
 
-/* Name and version of the engine, for /version: "SQLite 3.40.1". Static storage. */
-const char *store_engine(void);
+/* Name and version of the engine, for /version: "SQLite 3.40.1". Lives as long as the store. */
+const char *store_engine(const struct store *store);
+/* Whether a location is on a server: other daemons may share it, and it may be away for a while. */
+bool store_is_on_server(const char *location);
+
+/*
+ * Copies everything from one store into another, of whichever kinds, which must be empty: in one
+ * transaction, from one consistent state. What ran becomes queued. *ret_rows: how many rows.
+ * ISCHIA_E_STATE: there is something in `to`, or a daemon has one of them.
+ */
+ISCHIA_MUST_CHECK enum ischia_code store_move(const char *from, const char *to, int64_t *ret_rows,
+                                              struct ischia_error *err);
 int store_schema_version(void); /* that this program writes */
 
 #endif

@@ -1,91 +1,39 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * The store in one SQLite file: opening, closing and the connections that read.
+ * The engine in one SQLite file.
  *
  * Durability: write-ahead log with synchronous=FULL, so that COMMIT returns after fsync. Writes go
- * through one thread that commits all that wait at once (store_sqlite_write.c); reads have
- * connections of their own and never wait for a write.
+ * through one thread that commits all that wait at once (store_write.c); reads have connections of
+ * their own and never wait for a write.
  */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "server/store/store_sqlite.h"
 
-enum { BUSY_TIMEOUT_MS = 5000, READERS_MAX = 8 };
+enum { SCRUB_WAIT_MS = 100, SQLITE_BATCH_MAX = 512 };
 
-const char *store_engine(void)
+static struct sqlite_place *place_of(const struct store *store) { return store->place; }
+
+static const char *version(const struct store *store)
 {
     static char text[32]; /* the same bytes whoever writes them */
-    (void)sqlite3_snprintf(sizeof text, text, "SQLite %s", sqlite3_libversion());
+    (void)store;
+    (void)snprintf(text, sizeof text, "SQLite %s", sqlite3_libversion());
     return text;
-}
-
-int64_t sqlite_system_now_ms(void)
-{
-    struct timespec now;
-    (void)clock_gettime(CLOCK_REALTIME, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
-int64_t sqlite_now_ms(const struct store *store) { return store->now_ms(); }
-
-/* --------------------------------------------------------------------- reader connections */
-
-enum ischia_code reader_take(struct store *store, struct db **ret_db, struct ischia_error *err)
-{
-    enum ischia_code code = ISCHIA_OK;
-    (void)pthread_mutex_lock(&store->reader_lock);
-    if (store->idle_readers == NULL && store->reader_count < READERS_MAX) {
-        struct db *db = NULL;
-        code = db_open(store->paths.database, DB_READ, store->busy_timeout_ms, &db, err);
-        if (code == ISCHIA_OK) {
-            store->reader_count++;
-            (void)pthread_mutex_unlock(&store->reader_lock);
-            *ret_db = db;
-            return ISCHIA_OK;
-        }
-    }
-    /* Out of descriptors, perhaps: the connections that are open serve all the same. One is
-     * opened with the store, so that there is always one to wait for. */
-    while (store->idle_readers == NULL && store->reader_count > 0)
-        (void)pthread_cond_wait(&store->reader_free, &store->reader_lock);
-    struct db *db = store->idle_readers;
-    if (db != NULL) {
-        store->idle_readers = db->next;
-        *ret_db = db;
-        code = ISCHIA_OK;
-    }
-    (void)pthread_mutex_unlock(&store->reader_lock);
-    return code;
-}
-
-void reader_give(struct store *store, struct db *db)
-{
-    (void)pthread_mutex_lock(&store->reader_lock);
-    db->next = store->idle_readers;
-    store->idle_readers = db;
-    (void)pthread_cond_signal(&store->reader_free);
-    (void)pthread_mutex_unlock(&store->reader_lock);
-}
-
-static enum ischia_code first_reader(struct store *store, struct ischia_error *err)
-{
-    struct db *db = NULL;
-    TRY(reader_take(store, &db, err));
-    reader_give(store, db);
-    return ISCHIA_OK;
 }
 
 /* --------------------------------------------------------------------------- open, close */
 
-static enum ischia_code prepare_location(struct store *store, enum store_mode mode,
+static enum ischia_code prepare_location(struct sqlite_place *place, enum store_mode mode,
                                          struct ischia_error *err)
 {
-    TRY(sqlite_make_directory(&store->paths, err));
+    TRY(sqlite_make_directory(&place->paths, err));
     const int patience_ms = mode == STORE_SERVE ? SQLITE_LOCK_PATIENCE_MS : 0;
-    enum ischia_code code = sqlite_lock(&store->paths, patience_ms, &store->lock_fd, err);
+    enum ischia_code code = sqlite_lock(&place->paths, patience_ms, &place->lock_fd, err);
     /* A daemon that serves the store has migrated it; a command beside it only joins in. */
     if (code == ISCHIA_E_STATE && mode == STORE_ADMIN) return ISCHIA_OK;
     return code;
@@ -95,82 +43,109 @@ static enum ischia_code open_database(struct store *store, enum store_mode mode,
                                       struct ischia_error *err)
 {
     int version = 0;
-    if (store->lock_fd >= 0) TRY(sqlite_make_file(store->paths.database, err));
-    TRY(sqlite_look(store->paths.database, mode == STORE_SERVE, &version, err));
-    CHECK(version == sqlite_migration_count || store->lock_fd >= 0, err, ISCHIA_E_STATE,
+    const struct sqlite_place *place = place_of(store);
+    if (place->lock_fd >= 0) TRY(sqlite_make_file(place->paths.database, err));
+    TRY(sqlite_look(place->paths.database, mode == STORE_SERVE, &version, err));
+    CHECK(version == store_migration_count || place->lock_fd >= 0, err, ISCHIA_E_STATE,
           "the daemon that serves %s is of another version than this program",
-          store->paths.directory);
-    TRY(db_open(store->paths.database, DB_WRITE, store->busy_timeout_ms, &store->writer, err));
-    TRY(sqlite_migrate(store->writer, version, sqlite_migration_count, err));
-    return first_reader(store, err);
+          place->paths.directory);
+    TRY(sqlite_open(place->paths.database, DB_WRITE, store->busy_timeout_ms, &store->writer, err));
+    return sqlite_migrate(store->writer, version, store_migration_count, err);
 }
 
-static void give_back_lock(struct store *store)
+static void give_back_lock(struct sqlite_place *place)
 {
-    if (store->lock_fd >= 0) (void)close(store->lock_fd);
-    store->lock_fd = -1;
+    if (place->lock_fd >= 0) (void)close(place->lock_fd);
+    place->lock_fd = -1;
 }
 
-static void close_database(struct store *store)
+static enum ischia_code open_place(struct store *store, const struct store_options *options,
+                                   struct ischia_error *err)
 {
-    while (store->idle_readers != NULL) {
-        struct db *db = store->idle_readers;
-        store->idle_readers = db->next;
-        db_close(db);
-    }
-    db_close(store->writer);
-    give_back_lock(store);
-}
-
-static void set_up(struct store *store, const struct store_options *options)
-{
-    store->lock_fd = -1;
-    store->last = &store->first;
-    store->busy_timeout_ms =
-        options->busy_timeout_ms > 0 ? options->busy_timeout_ms : BUSY_TIMEOUT_MS;
-    store->idempotency_ms =
-        options->idempotency_ms > 0 ? options->idempotency_ms : STORE_IDEMPOTENCY_MS;
-    store->now_ms = options->now_ms != NULL ? options->now_ms : sqlite_system_now_ms;
-    (void)pthread_mutex_init(&store->reader_lock, NULL);
-    (void)pthread_cond_init(&store->reader_free, NULL);
-    (void)pthread_mutex_init(&store->write_lock, NULL);
-    (void)pthread_cond_init(&store->write_ready, NULL);
-}
-
-static void tear_down(struct store *store)
-{
-    (void)pthread_cond_destroy(&store->write_ready);
-    (void)pthread_mutex_destroy(&store->write_lock);
-    (void)pthread_cond_destroy(&store->reader_free);
-    (void)pthread_mutex_destroy(&store->reader_lock);
-    free(store);
-}
-
-enum ischia_code store_open(const struct store_options *options, struct store **ret_store,
-                            struct ischia_error *err)
-{
-    struct store *store = calloc(1, sizeof *store);
-    CHECK(store != NULL, err, ISCHIA_E_MEMORY, "no memory for the store");
-    set_up(store, options);
-    enum ischia_code code = sqlite_paths_of(options->location, &store->paths, err);
-    if (code == ISCHIA_OK) code = prepare_location(store, options->mode, err);
-    if (code == ISCHIA_OK) code = open_database(store, options->mode, err);
+    struct sqlite_place *place = calloc(1, sizeof *place);
+    CHECK(place != NULL, err, ISCHIA_E_MEMORY, "no memory for the store");
+    place->lock_fd = -1;
+    store->place = place;
+    TRY(sqlite_paths_of(options->location, &place->paths, err));
+    TRY(prepare_location(place, options->mode, err));
+    TRY(open_database(store, options->mode, err));
     /* A short-lived command needs the lock only to create or migrate. */
-    if (code == ISCHIA_OK && options->mode == STORE_ADMIN) give_back_lock(store);
-    if (code == ISCHIA_OK) code = writer_start(store, err);
-    if (code != ISCHIA_OK) {
-        close_database(store);
-        tear_down(store);
-        return code;
-    }
-    *ret_store = store;
+    if (options->mode == STORE_ADMIN) give_back_lock(place);
     return ISCHIA_OK;
 }
 
-void store_close(struct store *store)
+static void close_place(struct store *store)
 {
-    if (store == NULL) return;
-    writer_stop(store);
-    close_database(store);
-    tear_down(store);
+    if (store->place == NULL) return;
+    sqlite_close(store->writer);
+    give_back_lock(place_of(store));
+    free(store->place);
 }
+
+static enum ischia_code add_connection(struct store *store, struct db **ret_db,
+                                       struct ischia_error *err)
+{
+    return sqlite_open(place_of(store)->paths.database, DB_READ, store->busy_timeout_ms, ret_db,
+                       err);
+}
+
+/* A file is not lost by failing: the next attempt may do. */
+static bool is_lost(const struct db *db)
+{
+    (void)db;
+    return false;
+}
+
+static int64_t size_of_files(struct store *store, struct db *db)
+{
+    static const char *const suffixes[] = {"", "-wal", "-shm"};
+    int64_t size = 0;
+    (void)db;
+    for (size_t i = 0; i < sizeof suffixes / sizeof suffixes[0]; i++) {
+        char path[SQLITE_PATH_BYTES + 8];
+        struct stat status;
+        (void)stpcpy(stpcpy(path, place_of(store)->paths.database), suffixes[i]);
+        if (stat(path, &status) == 0) size += status.st_size;
+    }
+    return size;
+}
+
+/* ------------------------------------------------------------------------------ scrubbing */
+
+/* Erased rows are overwritten in the database (secure_delete), but older pages that held them are
+ * in the write-ahead log until it is emptied. A long read can delay that; it is tried again. */
+static void scrub(struct store *store)
+{
+    sqlite3_busy_timeout(sqlite_handle(store->writer), SCRUB_WAIT_MS);
+    int64_t busy = 1;
+    if (db_number(store->writer, "PRAGMA wal_checkpoint(TRUNCATE)", &busy, NULL) != ISCHIA_OK)
+        busy = 1;
+    sqlite3_busy_timeout(sqlite_handle(store->writer), store->busy_timeout_ms);
+    store->scrub = busy != 0;
+}
+
+const struct engine engine_sqlite = {
+    .undoes_one = true,
+    .batch_max = SQLITE_BATCH_MAX,
+    .open = open_place,
+    .close = close_place,
+    .connect = add_connection,
+    .disconnect = sqlite_close,
+    .begin = sqlite_begin,
+    .commit = sqlite_commit,
+    .roll_back = sqlite_roll_back,
+    .is_in_transaction = sqlite_is_in_transaction,
+    .mark = sqlite_mark,
+    .keep = sqlite_keep,
+    .is_lost = is_lost,
+    .step = sqlite_step,
+    .end = sqlite_end,
+    .integer = sqlite_integer,
+    .bytes = sqlite_bytes,
+    .changed = sqlite_changed,
+    .scrub = scrub,
+    .size_bytes = size_of_files,
+    .version = version,
+    .backup = sqlite_backup,
+    .restore = sqlite_restore,
+};

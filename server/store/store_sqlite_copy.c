@@ -18,11 +18,12 @@ enum { COPY_BUSY_TIMEOUT_MS = 30000 };
 /* All of it in one step: a copy in several would start again whenever someone writes. */
 static enum ischia_code copy_pages(struct db *to, struct db *from, struct ischia_error *err)
 {
-    sqlite3_backup *backup = sqlite3_backup_init(to->handle, "main", from->handle, "main");
-    if (backup == NULL) return db_fail(to, "be copied", err);
+    sqlite3_backup *backup =
+        sqlite3_backup_init(sqlite_handle(to), "main", sqlite_handle(from), "main");
+    if (backup == NULL) return sqlite_fail(to, "be copied", err);
     /* both report through the connection; finish repeats the failure of step */
     (void)sqlite3_backup_step(backup, -1);
-    if (sqlite3_backup_finish(backup) != SQLITE_OK) return db_fail(to, "be copied", err);
+    if (sqlite3_backup_finish(backup) != SQLITE_OK) return sqlite_fail(to, "be copied", err);
     return ISCHIA_OK;
 }
 
@@ -53,14 +54,14 @@ static enum ischia_code copy_to_file(const char *source, const char *path, int b
                                      struct ischia_error *err)
 {
     struct db *from = NULL, *to = NULL;
-    TRY(db_open(source, DB_READ, busy_timeout_ms, &from, err));
-    enum ischia_code code = db_open(path, DB_READ, busy_timeout_ms, &to, err);
-    if (code == ISCHIA_OK) code = db_execute(to, "PRAGMA synchronous = FULL", err);
+    TRY(sqlite_open(source, DB_READ, busy_timeout_ms, &from, err));
+    enum ischia_code code = sqlite_open(path, DB_READ, busy_timeout_ms, &to, err);
+    if (code == ISCHIA_OK) code = sqlite_execute(to, "PRAGMA synchronous = FULL", err);
     if (code == ISCHIA_OK) code = copy_pages(to, from, err);
     /* a single file that can be read from a read-only directory */
-    if (code == ISCHIA_OK) code = db_execute(to, "PRAGMA journal_mode = DELETE", err);
-    db_close(to);
-    db_close(from);
+    if (code == ISCHIA_OK) code = sqlite_execute(to, "PRAGMA journal_mode = DELETE", err);
+    sqlite_close(to);
+    sqlite_close(from);
     return code;
 }
 
@@ -73,14 +74,15 @@ static enum ischia_code publish(const char *temporary, const char *path, struct 
     return sqlite_sync_directory(path, err);
 }
 
-enum ischia_code store_backup(struct store *store, const char *path, struct ischia_error *err)
+enum ischia_code sqlite_backup(struct store *store, const char *path, struct ischia_error *err)
 {
+    const struct sqlite_place *place = store->place;
     char temporary[SQLITE_PATH_BYTES];
     CHECK(access(path, F_OK) != 0, err, ISCHIA_E_STATE, "%s exists already", path);
     TRY(make_temporary(path, temporary, err));
     int version = 0;
     enum ischia_code code =
-        copy_to_file(store->paths.database, temporary, store->busy_timeout_ms, err);
+        copy_to_file(place->paths.database, temporary, store->busy_timeout_ms, err);
     if (code == ISCHIA_OK) code = sqlite_look(temporary, true, &version, err);
     if (code == ISCHIA_OK) code = publish(temporary, path, err);
     remove_temporary(temporary);
@@ -91,11 +93,11 @@ enum ischia_code store_backup(struct store *store, const char *path, struct isch
 
 static enum ischia_code recover_alone(struct db *db, struct ischia_error *err)
 {
-    struct store clock = {.now_ms = sqlite_system_now_ms}; /* all that recover_run needs of one */
+    struct store clock = {0}; /* the system's: all that recover_run needs of one */
     int requeued = 0;
-    TRY(db_run(db, SQL_BEGIN, err));
+    TRY(sqlite_begin(NULL, db, err));
     TRY(recover_run(&clock, db, &requeued, err));
-    return db_run(db, SQL_COMMIT, err);
+    return sqlite_commit(db, err);
 }
 
 /* A copy of the backup, brought to this program's schema, with nothing running. */
@@ -107,10 +109,10 @@ static enum ischia_code prepare_copy(const char *backup_path, const char *tempor
     TRY(sqlite_look(backup_path, true, &version, err));
     CHECK(version > 0, err, ISCHIA_E_INPUT, "%s is empty, not a backup", backup_path);
     TRY(copy_to_file(backup_path, temporary, COPY_BUSY_TIMEOUT_MS, err));
-    TRY(db_open(temporary, DB_READ, COPY_BUSY_TIMEOUT_MS, &db, err));
-    enum ischia_code code = sqlite_migrate(db, version, sqlite_migration_count, err);
+    TRY(sqlite_open(temporary, DB_READ, COPY_BUSY_TIMEOUT_MS, &db, err));
+    enum ischia_code code = sqlite_migrate(db, version, store_migration_count, err);
     if (code == ISCHIA_OK) code = recover_alone(db, err);
-    db_close(db);
+    sqlite_close(db);
     return code;
 }
 
@@ -132,11 +134,11 @@ static enum ischia_code copy_into(const char *database, const char *temporary,
                                   struct ischia_error *err)
 {
     struct db *from = NULL, *to = NULL;
-    TRY(db_open(temporary, DB_READ, COPY_BUSY_TIMEOUT_MS, &from, err));
-    enum ischia_code code = db_open(database, DB_WRITE, COPY_BUSY_TIMEOUT_MS, &to, err);
+    TRY(sqlite_open(temporary, DB_READ, COPY_BUSY_TIMEOUT_MS, &from, err));
+    enum ischia_code code = sqlite_open(database, DB_WRITE, COPY_BUSY_TIMEOUT_MS, &to, err);
     if (code == ISCHIA_OK) code = copy_pages(to, from, err);
-    db_close(to);
-    db_close(from);
+    sqlite_close(to);
+    sqlite_close(from);
     return code;
 }
 
@@ -157,8 +159,8 @@ static enum ischia_code replace(const struct sqlite_paths *paths, const char *te
     return code;
 }
 
-enum ischia_code store_restore(const char *location, const char *backup_path,
-                               struct ischia_error *err)
+enum ischia_code sqlite_restore(const char *location, const char *backup_path,
+                                struct ischia_error *err)
 {
     struct sqlite_paths paths;
     char temporary[SQLITE_PATH_BYTES];

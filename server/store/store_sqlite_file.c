@@ -102,10 +102,10 @@ static enum ischia_code judge_version(struct db *db, const char *path, int *ret_
     const bool empty = application == 0 && version == 0 && tables == 0;
     CHECK(empty || application == SQLITE_APPLICATION_ID, err, ISCHIA_E_INPUT,
           "%s is an SQLite database, but not one of Ischia's; it was left as it is", path);
-    CHECK(version <= sqlite_migration_count, err, ISCHIA_E_STATE,
+    CHECK(version <= store_migration_count, err, ISCHIA_E_STATE,
           "%s was written by a newer Ischia (schema %d, this program knows %d): "
           "use that program, or restore a backup made by this one; it was left as it is",
-          path, (int)version, sqlite_migration_count);
+          path, (int)version, store_migration_count);
     *ret_version = (int)version;
     return ISCHIA_OK;
 }
@@ -113,11 +113,10 @@ static enum ischia_code judge_version(struct db *db, const char *path, int *ret_
 static enum ischia_code judge_pages(struct db *db, const char *path, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin_text(&query, db, "PRAGMA integrity_check(1)", err));
+    query_begin_text(&query, db, "PRAGMA integrity_check(1)");
     bool row = false;
     enum ischia_code code = query_step(&query, &row, err);
-    const char *verdict =
-        row ? (const char *)sqlite3_column_text(query.statement, 0) : "no verdict";
+    const char *verdict = row ? query_peek_text(&query, 0) : "no verdict";
     if (code == ISCHIA_OK && (verdict == NULL || strcmp(verdict, "ok") != 0))
         code = FAIL(err, ISCHIA_E_INPUT,
                     "%s is damaged (%.200s): restore a backup with `ischiad restore`; "
@@ -144,13 +143,13 @@ static enum ischia_code look_once(const char *path, bool whole, int *ret_version
                                   bool *ret_unfinished, struct ischia_error *err)
 {
     struct db *db = NULL;
-    const enum ischia_code opened = db_open(path, DB_LOOK, 5000, &db, err);
+    const enum ischia_code opened = sqlite_open(path, DB_LOOK, 5000, &db, err);
     if (opened != ISCHIA_OK)
         return opened == ISCHIA_E_INPUT ? damaged(path, SQLITE_NOTADB, err) : opened;
     enum ischia_code code = judge_version(db, path, ret_version, err);
     if (code == ISCHIA_OK && whole) code = judge_pages(db, path, err);
-    const int sqlite_code = sqlite3_extended_errcode(db->handle);
-    db_close(db);
+    const int sqlite_code = sqlite3_extended_errcode(sqlite_handle(db));
+    sqlite_close(db);
     *ret_unfinished = code != ISCHIA_OK && sqlite_code == SQLITE_READONLY_ROLLBACK;
     return code == ISCHIA_OK ? ISCHIA_OK : damaged(path, sqlite_code, err);
 }
@@ -161,9 +160,9 @@ static enum ischia_code take_back_unfinished(const char *path, struct ischia_err
 {
     struct db *db = NULL;
     int64_t tables;
-    TRY(db_open(path, DB_READ, 5000, &db, err));
+    TRY(sqlite_open(path, DB_READ, 5000, &db, err));
     const enum ischia_code code = db_number(db, "SELECT count(*) FROM sqlite_schema", &tables, err);
-    db_close(db);
+    sqlite_close(db);
     return code;
 }
 
@@ -181,26 +180,22 @@ enum ischia_code sqlite_look(const char *path, bool whole, int *ret_version,
 
 /* --------------------------------------------------------------------------- migrations */
 
-static enum ischia_code migrate_one(struct db *db, const struct sqlite_migration *migration,
+static enum ischia_code migrate_one(struct db *db, const struct migration *migration,
                                     struct ischia_error *err)
 {
     char mark[64];
     (void)sqlite3_snprintf(sizeof mark, mark, "PRAGMA user_version = %d", migration->version);
-    TRY(db_run(db, SQL_BEGIN, err));
-    enum ischia_code code = db_execute(db, migration->sql, err);
-    if (code == ISCHIA_OK) code = db_execute(db, mark, err);
-    if (code == ISCHIA_OK) code = db_run(db, SQL_COMMIT, err);
-    /* after some failures SQLite has rolled back by itself */
-    if (code != ISCHIA_OK && sqlite3_get_autocommit(db->handle) == 0)
-        (void)!db_run(db, SQL_ROLLBACK, NULL);
+    TRY(sqlite_begin(NULL, db, err));
+    enum ischia_code code = sqlite_execute(db, migration->sqlite, err);
+    if (code == ISCHIA_OK) code = sqlite_execute(db, mark, err);
+    if (code == ISCHIA_OK) code = sqlite_commit(db, err);
+    if (code != ISCHIA_OK) sqlite_roll_back(db);
     return code;
 }
 
 enum ischia_code sqlite_migrate(struct db *db, int from, int to, struct ischia_error *err)
 {
     for (int version = from + 1; version <= to; version++)
-        TRY(migrate_one(db, &sqlite_migrations[version - 1], err));
+        TRY(migrate_one(db, &store_migrations[version - 1], err));
     return ISCHIA_OK;
 }
-
-int store_schema_version(void) { return sqlite_migration_count; }

@@ -86,7 +86,8 @@ struct store_study_claim {
 
 /* Takes the next waiting point, oldest study first: queued -> running. Points whose case has been
  * solved before, for whom ever, are finished from that result on the way. STORE_NOT_FOUND when
- * nothing is left to solve. */
+ * nothing is left to solve. Errors as of store_claim_next: then the caller owes a
+ * store_study_settle to queued. */
 ISCHIA_MUST_CHECK enum ischia_code
 store_study_claim_next(struct store *store, struct store_study_claim *ret,
                        enum store_answer *ret_answer, struct ischia_error *err);

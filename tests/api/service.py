@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A running ischiad for a test: its own state directory, a free port, a fake worker.
 
+With TESTED_ON=postgresql every state directory has a database of its own on a throw-away server.
+
 With TESTED_THROUGH=nginx every service stands behind nginx as deploy/nginx/ischia.conf has it:
 clients speak TLS with the proxy and show a token, and the daemon believes the proxy only.
 """
+import atexit
 import http.client
 import json
 import os
 import shutil
 import signal
 import socket
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -27,12 +31,59 @@ PROXY = os.environ.get('TESTED_THROUGH', '')
 if PROXY:
     sys.path.append(os.path.join(HERE, '../proxy'))
     import front
+ON_SERVER = os.environ.get('TESTED_ON', '') == 'postgresql'
+if ON_SERVER:
+    sys.path.append(os.path.join(HERE, '../postgresql'))
+    import cluster
 SIDE = {'R1': 7.1, 'R2': 22.8, 'eM': 31, 'eF': 10, 'muM': 8, 'muF': 5, 'F': 258}
 
 
 def direct_only(reason):
     """For a test of what the daemon does on a connection of its own."""
     return unittest.skipIf(PROXY, f'not through a proxy: {reason}')
+
+
+def file_only(reason):
+    """For a test of what only a store in a file has."""
+    return unittest.skipIf(ON_SERVER, f'not on PostgreSQL: {reason}')
+
+
+class Databases:
+    """One for each state directory, made when it is first asked for."""
+
+    server = None
+    names = {}
+
+    @classmethod
+    def url(cls, state):
+        if cls.server is None:
+            cluster.skip_without_server()
+            cls.server = cluster.Cluster()
+            atexit.register(cls.server.stop)
+        if state not in cls.names:
+            cls.names[state] = f'state_{len(cls.names)}'
+            cls.server.sql(f'CREATE DATABASE {cls.names[state]}', database='postgres')
+        return cls.server.url.replace('///ischia?', f'///{cls.names[state]}?')
+
+
+def store_options(state):
+    """Where the store of a state directory is, as options of ischiad."""
+    return ('--store', Databases.url(state)) if ON_SERVER else ()
+
+
+def sql(state, text, identity):
+    """Runs SQL in the store, not as a daemon would; '{}' stands for the id. Returns what psql says,
+    or the first value."""
+    digits = identity.replace('-', '')
+    if ON_SERVER:
+        text = text.replace("'{}'", f"'\\x{digits}'::bytea")
+        return Databases.server.sql('SET search_path = ischia; ' + text,
+                                    database=Databases.names[state]).removeprefix('SET\n')
+    database = sqlite3.connect(state + '/ischia.sqlite')
+    rows = database.execute(text.replace("'{}'", f"x'{digits}'")).fetchall()
+    database.commit()
+    database.close()
+    return str(rows[0][0]) if rows else ''
 
 
 class SecureConnection(http.client.HTTPSConnection):
@@ -77,9 +128,8 @@ class Answer:
 
 def admin(state, *words, check=True):
     """Runs an administration command; returns its standard output."""
-    done = subprocess.run(
-        [PROGRAM, '--state-dir', state, *words], capture_output=True, text=True, timeout=PATIENCE_S
-    )
+    command = [PROGRAM, '--state-dir', state, *store_options(state), *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
     if check and done.returncode != 0:
         raise AssertionError(f'{words}: {done.returncode}: {done.stderr}')
     return done.stdout if check else done
@@ -96,7 +146,8 @@ def command_line(state, *options, listen='127.0.0.1:0', worker=FAKE_WORKER):
     }
     if PROXY:
         options = ('--behind-proxy', '--proxy-addresses', '127.0.0.1', *options)
-    return [PROGRAM, *(word for pair in usual.items() for word in pair), *options]
+    return [PROGRAM, *(word for pair in usual.items() for word in pair), *store_options(state),
+            *options]
 
 
 class Service:

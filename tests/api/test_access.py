@@ -13,6 +13,7 @@ import time
 import unittest
 
 from service import (JSON, PATIENCE_S, PROGRAM, PROXY, Service, admin, direct_only, eventually,
+                     file_only,
                      side)
 
 FORM = {'Content-Type': 'application/x-www-form-urlencoded'}
@@ -396,6 +397,7 @@ class Doors(unittest.TestCase):
 
 
 class Copies(unittest.TestCase):
+    @file_only('pg_dump and pg_restore make the copies: tests/deploy/backup_drill.py')
     def test_backup_and_restore_while_it_runs(self):
         with Service() as service, tempfile.TemporaryDirectory() as folder:
             service.until_ready()

@@ -15,7 +15,7 @@ import tempfile
 import time
 import unittest
 
-from service import PATIENCE_S, PROGRAM, Service, admin, direct_only, eventually
+from service import PATIENCE_S, PROGRAM, Service, admin, direct_only, eventually, file_only, sql
 
 JOURNAL = '/run/systemd/journal'
 
@@ -284,18 +284,18 @@ class Retention(unittest.TestCase):
 
     @staticmethod
     def grow_older(state, identity, days):
-        database = sqlite3.connect(state + '/ischia.sqlite')
-        changed = database.execute(
-            'UPDATE assessment SET created_ms = created_ms - :ms, started_ms = started_ms - :ms,'
-            ' finished_ms = finished_ms - :ms WHERE id = :id',
-            {'ms': days * 86400000, 'id': bytes.fromhex(identity.replace('-', ''))},
-        ).rowcount
-        database.commit()
-        database.close()
-        assert changed == 1
+        ms = days * 86400000
+        said = sql(
+            state,
+            f'UPDATE assessment SET created_ms = created_ms - {ms}, started_ms = started_ms - {ms},'
+            f" finished_ms = finished_ms - {ms} WHERE id = '{{}}' RETURNING state",
+            identity,
+        )
+        assert said.startswith('2'), said
 
 
 class Audit(unittest.TestCase):
+    @file_only('the copy that is tampered with is a file')
     def test_tampering_shows(self):
         with Service() as service:
             service.until_ready()

@@ -11,6 +11,8 @@
  *   stale            a good answer, to a job that it does not have
  *   die_after        a good result, then SIGSEGV
  *   unconverged      calls a diverged result a result
+ * A real case has no such member: then the force says it, as of tests/api/fake_worker.py: 598 N
+ * diverges, 597 N crashes, 596 N is slow, and newton_iterations is the force in mN.
  * A first argument changes how it starts: no_hello, exit_first, die_after_hello, wrong_version.
  */
 #include <math.h>
@@ -92,7 +94,8 @@ static struct ischia_result make_result(const struct fake *fake)
                                                .det_F_min = 0.9,
                                                .eps_max_error = 0.01,
                                                .last_converged_F_N = 258.0};
-    result.numerics.newton_iterations = (int)number_of(fake, "n", 1.0);
+    const double force_mN = round(1e3 * number_of(fake, "F", 1e-3));
+    result.numerics.newton_iterations = (int)number_of(fake, "n", force_mN);
     return result;
 }
 
@@ -135,7 +138,7 @@ static void do_solve(struct fake *fake)
 {
     const struct ischia_result result = make_result(fake);
     say_progress(fake, 0.5);
-    sleep_ms(number_of(fake, "ms", 0.0));
+    sleep_ms(number_of(fake, "ms", (int)number_of(fake, "F", 0.0) == 596 ? 1000.0 : 0.0));
     say_result(fake, &result);
 }
 
@@ -273,10 +276,23 @@ static const struct {
     {"unconverged", do_unconverged},
 };
 
+static const char *wish_of(const struct fake *fake)
+{
+    static const struct {
+        int force_N;
+        const char *name;
+    } forces[] = {{598, "diverge"}, {597, "crash"}, {596, "slow"}};
+    const struct json *name = json_member(fake->given, "do");
+    if (name != NULL) return json_string(name);
+    const int force_N = (int)number_of(fake, "F", 0.0);
+    for (size_t i = 0; i < sizeof forces / sizeof forces[0]; i++)
+        if (forces[i].force_N == force_N) return forces[i].name;
+    return "solve";
+}
+
 static void act(struct fake *fake)
 {
-    const struct json *name = json_member(fake->given, "do");
-    const char *wished = name == NULL ? "solve" : json_string(name);
+    const char *wished = wish_of(fake);
     for (size_t i = 0; i < sizeof acts / sizeof acts[0]; i++)
         if (strcmp(acts[i].name, wished) == 0) {
             acts[i].act(fake);

@@ -13,7 +13,8 @@ import unittest
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 DEPLOY = os.path.join(HERE, '../../deploy')
-sys.path.insert(0, os.path.join(HERE, '../api'))
+sys.path[:0] = [os.path.join(HERE, '../api'), os.path.join(HERE, '../postgresql')]
+from cluster import Cluster, programs  # noqa: E402  (the path comes first)
 from service import PATIENCE_S, PROGRAM, Service, admin, eventually  # noqa: E402
 
 
@@ -106,6 +107,52 @@ class Drill(unittest.TestCase):
             self.assertIn('cannot be restored', said.stderr)
             self.assertEqual(copies(folder), [old])
             self.assertEqual(len(copies(folder, '.bad')), 1)
+
+
+@unittest.skipUnless(programs(), 'PostgreSQL is not installed')
+class ServerDrill(unittest.TestCase):
+    """The same for a store on a PostgreSQL server, with the server's own means."""
+
+    def test_a_dump_made_under_load_can_be_put_back_on_another_server(self):
+        with Cluster() as server, tempfile.TemporaryDirectory() as folder:
+            dump = os.path.join(folder, 'dump')
+            with Service('--store', server.url, '--workers', '2') as service:
+                service.until_ready()
+                done = [service.submit(F=100 + i / 8, subject=f'D-{i}') for i in range(20)]
+                go_on = threading.Event()
+
+                def load():
+                    i = 0
+                    while not go_on.is_set():
+                        body = {**done[0]['parameters'], 'F': 200 + i / 64}
+                        assert service.ask('POST', '/v1/assessments', body).status == 202
+                        i += 1
+
+                thread = threading.Thread(target=load)
+                thread.start()
+                subprocess.run(['pg_dump', '--format=custom', '--schema=ischia', '--file', dump,
+                                server.url], check=True, timeout=PATIENCE_S)
+                go_on.set()
+                thread.join()
+            server.stop()
+            with Cluster() as other:
+                subprocess.run(['pg_restore', '--exit-on-error', '--dbname', other.url, dump],
+                               check=True, timeout=PATIENCE_S)
+                self.go_on_there(other.url, done)
+
+    def go_on_there(self, url, done):
+        with Service('--store', url, '--workers', '2') as again:
+            again.until_ready()
+            for document in done:
+                self.assertEqual(again.get(document['links']['self']).json(), document)
+            waiting = lambda: [
+                item
+                for status in ('queued', 'running')
+                for item in again.get(f'/v1/assessments?status={status}&limit=1').json()['items']
+            ]
+            eventually(lambda: not waiting(), 'what waited or ran at the time of the dump')
+            again.submit(F=333.5)  # numbers go on where they were
+            self.assertIn('the chain holds', admin(again.state, '--store', url, 'audit', 'verify'))
 
 
 class Rotation(unittest.TestCase):

@@ -50,8 +50,8 @@ class Parts(unittest.TestCase):
                 self.assertNotIn('not declared', text)
 
     def test_every_library_that_is_loaded_is_in_it(self):
-        for word in ('libsqlite3-0', 'libmicrohttpd12', 'libgnutls30', 'libcholmod3', 'libsodium23',
-                     'libc6', 'libcjson1', 'libseccomp2'):
+        for word in ('libsqlite3-0', 'libpq5', 'libmicrohttpd12', 'libgnutls30', 'libcholmod3',
+                     'libsodium23', 'libc6', 'libcjson1', 'libseccomp2'):
             self.assertIn(word, self.needed)
         self.assertTrue(any(name.startswith('libopenblas') for name in self.needed))
         for program in PROGRAMS:

@@ -83,11 +83,12 @@ class Bench:
         """The same program one release later, with one migration more."""
         tree = self.clone('later')
         store = os.path.join(tree, 'server/store')
-        last = max(f for f in os.listdir(store) if re.fullmatch(r'\d{4}_\w+\.sql', f))
-        name = f'{int(last[:4]) + 1:04d}_later.sql'
-        with open(os.path.join(store, name), 'w', encoding='utf-8') as file:
-            file.write('-- SPDX-License-Identifier: GPL-3.0-or-later\n'
-                       'CREATE TABLE later (id INTEGER PRIMARY KEY) STRICT;\n')
+        last = max(os.listdir(os.path.join(store, 'sqlite'))).removesuffix('.sql')
+        name = f'{int(last[:4]) + 1:04d}_later'
+        for engine in ('sqlite', 'postgresql'):
+            with open(os.path.join(store, engine, name + '.sql'), 'w', encoding='utf-8') as file:
+                file.write('-- SPDX-License-Identifier: GPL-3.0-or-later\n'
+                           'CREATE TABLE later (id INTEGER PRIMARY KEY);\n')
         edit(os.path.join(store, 'meson.build'), f"'{last}'", f"'{last}', '{name}'")
         edit(os.path.join(tree, 'meson.build'), r"version: '[\d.]+'", "version: '9.0.0'")
         edit(os.path.join(tree, 'deploy/debian/changelog'), r'ischia \([^)]*\)', 'ischia (9.0.0)')

@@ -16,6 +16,7 @@
 #include <cmocka.h>
 
 #include "server/store/store.h"
+#include "tests/unit/test_server.h"
 
 static int64_t clock_ms;
 static inline int64_t fake_now(void) { return clock_ms; }
@@ -34,7 +35,8 @@ static inline void expect_ok(enum ischia_code code, const struct ischia_error *e
 static inline void open_room(struct room *room)
 {
     struct ischia_error err = {0};
-    const struct store_options options = {.location = room->path, .now_ms = fake_now};
+    const struct store_options options = {
+        .location = test_server() == NULL ? room->path : test_server(), .now_ms = fake_now};
     expect_ok(store_open(&options, &room->store, &err), &err);
 }
 
@@ -46,6 +48,7 @@ static inline int set_up(void **state)
     (void)stpcpy(room->directory, "/tmp/ischia-store-XXXXXX");
     assert_non_null(mkdtemp(room->directory));
     (void)snprintf(room->path, sizeof room->path, "%s/state", room->directory);
+    if (test_server() != NULL) empty_server();
     open_room(room);
     *state = room;
     return 0;

@@ -122,6 +122,7 @@ static void test_erasing_takes_everything_along(void **state)
     assert_false(next(room->store, "a", &row));
     OK(store_feedback_list(room->store, count_feedback, &count, &err));
     assert_int_equal(count, 1);
+    if (test_server() != NULL) return; /* the bytes are the server's: docs/INVARIANTS.md, I11 */
     store_close(room->store);
     char path[256], *bytes = NULL;
     (void)snprintf(path, sizeof path, "%s/ischia.sqlite", room->path);

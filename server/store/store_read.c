@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
-#include "server/store/store_sqlite.h"
+#include "server/store/engine.h"
 
 /* ------------------------------------------------------------------------ one assessment */
 
@@ -21,7 +21,7 @@ void store_assessment_finish(struct store_assessment *a)
     *a = (struct store_assessment){0};
 }
 
-/* The columns of sqlite_assessment_columns, in their order. */
+/* The columns of sql_assessment_columns, in their order. */
 enum {
     COLUMN_FIRST_TEXT = 10,
     COLUMN_PROBLEM = 16,
@@ -67,7 +67,7 @@ static enum ischia_code get_from(struct db *db, const struct uuid *id, bool text
                                  struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_GET, err));
+    query_begin(&query, db, SQL_GET);
     query_put_blob(&query, id->byte, UUID_BYTES);
     enum ischia_code code = query_step(&query, ret_found, err);
     if (code == ISCHIA_OK && *ret_found) code = read_assessment(&query, texts, texts, ret, err);
@@ -113,11 +113,12 @@ static enum ischia_code copy_field(struct query *query, unsigned char **ret_byte
     bool row = false;
     TRY(query_step(query, &row, err));
     *ret_answer = row ? STORE_CONFLICT : STORE_NOT_FOUND;
-    if (!row || sqlite3_column_type(query->statement, 0) == SQLITE_NULL) return ISCHIA_OK;
-    const void *bytes = sqlite3_column_blob(query->statement, 0);
-    const size_t size = (size_t)sqlite3_column_bytes(query->statement, 0);
+    if (!row) return ISCHIA_OK;
+    size_t size = 0;
+    const void *bytes = query->db->engine->bytes(query, 0, &size);
+    if (bytes == NULL && size == 0) return ISCHIA_OK;
     unsigned char *copy = malloc(size > 0 ? size : 1);
-    if (copy == NULL || (bytes == NULL && size > 0)) {
+    if (copy == NULL || bytes == NULL) {
         free(copy);
         return FAIL(err, ISCHIA_E_MEMORY, "no memory for a stored field");
     }
@@ -135,12 +136,10 @@ enum ischia_code store_get_field(struct store *store, const struct uuid *id,
     struct db *db = NULL;
     struct query query;
     TRY(reader_take(store, &db, err));
-    enum ischia_code code = query_begin(&query, db, SQL_FIELD, err);
-    if (code == ISCHIA_OK) {
-        query_put_blob(&query, id->byte, UUID_BYTES);
-        code = copy_field(&query, ret_bytes, ret_size, ret_answer, err);
-        query_end(&query);
-    }
+    query_begin(&query, db, SQL_FIELD);
+    query_put_blob(&query, id->byte, UUID_BYTES);
+    const enum ischia_code code = copy_field(&query, ret_bytes, ret_size, ret_answer, err);
+    query_end(&query);
     reader_give(store, db);
     return code;
 }
@@ -194,23 +193,26 @@ static void put_exchange_bounds(struct query *query, const struct store_filter *
 }
 
 /* Only the conditions that are asked for: each combination then finds its index. */
-static void list_text(const struct store_filter *filter, char ret[LIST_TEXT_BYTES])
+static void list_text(const struct db *db, const struct store_filter *filter,
+                      char ret[LIST_TEXT_BYTES])
 {
-    (void)sqlite3_snprintf(
-        LIST_TEXT_BYTES, ret,
+    char times[256];
+    const char *changed = sql_for(db->engine, &sql_piece[SQL_PIECE_CHANGED]);
+    (void)snprintf(times, sizeof times,
+                   " AND a.finished_ms >= ? AND a.finished_ms < ? AND %s >= ? AND %s < ?", changed,
+                   changed);
+    (void)snprintf(
+        ret, LIST_TEXT_BYTES,
         "SELECT %s FROM assessment a LEFT JOIN solution s ON s.rowid = a.solution "
         "LEFT JOIN origin o ON o.assessment = a.seq "
         "WHERE a.seq < ?%s%s%s%s%s%s ORDER BY a.seq DESC LIMIT ?",
-        sqlite_assessment_columns, filter->subject == NULL ? "" : " AND a.subject = ?",
+        sql_assessment_columns, filter->subject == NULL ? "" : " AND a.subject = ?",
         filter->side == NULL ? "" : " AND a.side = ?", filter->by_state ? " AND a.state = ?" : "",
-        filter->states == 0 ? "" : " AND (1 << a.state & ?) <> 0",
+        filter->states == 0 ? "" : sql_for(db->engine, &sql_piece[SQL_PIECE_STATES]),
         !has_person(filter) ? ""
                             : " AND a.seq IN (SELECT seq FROM assessment WHERE subject = ? UNION "
                               "SELECT assessment FROM origin WHERE reference = ?)",
-        !has_times(filter) ? ""
-                           : " AND a.finished_ms >= ? AND a.finished_ms < ?"
-                             " AND max(a.created_ms, a.started_ms, a.finished_ms) >= ?"
-                             " AND max(a.created_ms, a.started_ms, a.finished_ms) < ?");
+        has_times(filter) ? times : "");
 }
 
 struct listing {
@@ -255,9 +257,9 @@ static enum ischia_code list_from(struct db *db, struct listing *listing, int64_
 {
     const struct store_filter *filter = listing->filter;
     char text[LIST_TEXT_BYTES];
-    list_text(filter, text);
+    list_text(db, filter, text);
     struct query query;
-    TRY(query_begin_text(&query, db, text, err));
+    query_begin_text(&query, db, text);
     query_put_integer(&query, before);
     if (filter->subject != NULL) query_put_text(&query, filter->subject);
     if (filter->side != NULL) query_put_text(&query, filter->side);
@@ -286,8 +288,7 @@ enum ischia_code store_list(struct store *store, const struct store_filter *filt
     TRY(code);
     ret_cursor[0] = '\0';
     if (listing.last_seq != 0)
-        (void)sqlite3_snprintf(STORE_CURSOR_BYTES, ret_cursor, "c%llx",
-                               (long long)listing.last_seq);
+        (void)snprintf(ret_cursor, STORE_CURSOR_BYTES, "c%llx", (long long)listing.last_seq);
     return ISCHIA_OK;
 }
 
@@ -313,12 +314,8 @@ static enum ischia_code show_changes(struct query *query, store_on_change *on_ch
 static enum ischia_code last_change(struct db *db, int64_t *ret_last, struct ischia_error *err)
 {
     struct query query;
-    bool row = false;
-    TRY(query_begin(&query, db, SQL_CHANGES_LAST, err));
-    const enum ischia_code code = query_step(&query, &row, err);
-    if (code == ISCHIA_OK) *ret_last = row ? query_integer(&query, 0) : 0;
-    query_end(&query);
-    return code;
+    query_begin(&query, db, SQL_CHANGES_LAST);
+    return query_number(&query, 0, ret_last, err);
 }
 
 static enum ischia_code changes_from(struct db *db, int64_t since, int limit,
@@ -328,7 +325,7 @@ static enum ischia_code changes_from(struct db *db, int64_t since, int limit,
     struct query query;
     /* the end first: a change made meanwhile is then beyond it, never before it and unseen */
     TRY(last_change(db, ret_last, err));
-    TRY(query_begin(&query, db, SQL_CHANGES, err));
+    query_begin(&query, db, SQL_CHANGES);
     query_put_integer(&query, since);
     query_put_integer(&query, limit);
     const enum ischia_code code = show_changes(&query, on_change, context, err);
@@ -354,7 +351,7 @@ enum ischia_code store_changes(struct store *store, int64_t since, int limit,
 static enum ischia_code read_tally(struct db *db, struct store_stats *ret, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_TALLY_ALL, err));
+    query_begin(&query, db, SQL_TALLY_ALL);
     enum ischia_code code;
     for (bool row = true;;) {
         code = query_step(&query, &row, err);
@@ -370,25 +367,8 @@ static enum ischia_code read_oldest(struct db *db, struct store_stats *ret,
                                     struct ischia_error *err)
 {
     struct query query;
-    bool row = false;
-    TRY(query_begin(&query, db, SQL_OLDEST_QUEUED, err));
-    const enum ischia_code code = query_step(&query, &row, err);
-    if (code == ISCHIA_OK && row) ret->oldest_queued_ms = query_integer(&query, 0);
-    query_end(&query);
-    return code;
-}
-
-static int64_t size_of_files(const struct store *store)
-{
-    static const char *const suffixes[] = {"", "-wal", "-shm"};
-    int64_t size = 0;
-    for (size_t i = 0; i < sizeof suffixes / sizeof suffixes[0]; i++) {
-        char path[SQLITE_PATH_BYTES + 8];
-        struct stat status;
-        (void)stpcpy(stpcpy(path, store->paths.database), suffixes[i]);
-        if (stat(path, &status) == 0) size += status.st_size;
-    }
-    return size;
+    query_begin(&query, db, SQL_OLDEST_QUEUED);
+    return query_number(&query, 0, &ret->oldest_queued_ms, err);
 }
 
 static void copy_counts(struct store *store, struct store_stats *ret)
@@ -410,9 +390,9 @@ enum ischia_code store_stats(struct store *store, struct store_stats *ret, struc
     TRY(reader_take(store, &db, err));
     enum ischia_code code = read_tally(db, &stats, err);
     if (code == ISCHIA_OK) code = read_oldest(db, &stats, err);
+    if (code == ISCHIA_OK) stats.size_bytes = store->engine->size_bytes(store, db);
     reader_give(store, db);
     TRY(code);
-    stats.size_bytes = size_of_files(store);
     copy_counts(store, &stats);
     *ret = stats;
     return ISCHIA_OK;

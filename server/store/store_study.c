@@ -8,28 +8,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/store/store_sqlite.h"
+#include "server/store/engine.h"
 
 /* One number out of a statement with one number, or one id, as its parameter; -1: no row. */
 static enum ischia_code number_by(struct db *db, enum sql sql, const struct uuid *id, int64_t seq,
                                   int64_t *ret, struct ischia_error *err)
 {
     struct query query;
-    bool row = false;
-    TRY(query_begin(&query, db, sql, err));
+    query_begin(&query, db, sql);
     if (id != NULL)
         query_put_blob(&query, id->byte, UUID_BYTES);
     else
         query_put_integer(&query, seq);
-    const enum ischia_code code = query_step(&query, &row, err);
-    if (code == ISCHIA_OK) *ret = row ? query_integer(&query, 0) : -1;
-    query_end(&query);
-    return code;
+    return query_number(&query, -1, ret, err);
 }
 
 static enum ischia_code count_waiting(struct db *db, int64_t *ret, struct ischia_error *err)
 {
-    return db_number(db, "SELECT count(*) FROM study_point WHERE state = 0", ret, err);
+    struct query query;
+    query_begin(&query, db, SQL_STUDY_WAITING);
+    return query_number(&query, 0, ret, err);
 }
 
 /* Marks a study as over once none of its points is left to solve. */
@@ -37,8 +35,8 @@ static enum ischia_code end_if_over(struct store *store, struct db *db, int64_t 
                                     struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_END, err));
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_begin(&query, db, SQL_STUDY_END);
+    query_put_integer(&query, store_now_ms(store));
     query_put_integer(&query, seq);
     return query_run(&query, err);
 }
@@ -60,10 +58,10 @@ static enum ischia_code look_up_key(struct store *store, struct db *db, struct s
     struct query query;
     *ret_answered = false;
     if (what->idempotency_key == NULL) return ISCHIA_OK;
-    TRY(query_begin(&query, db, SQL_STUDY_KEY_FIND, err));
+    query_begin(&query, db, SQL_STUDY_KEY_FIND);
     query_put_text(&query, what->client);
     query_put_text(&query, what->idempotency_key);
-    query_put_integer(&query, sqlite_now_ms(store) - store->idempotency_ms);
+    query_put_integer(&query, store_now_ms(store) - store->idempotency_ms);
     enum ischia_code code = query_step(&query, ret_answered, err);
     if (code == ISCHIA_OK && *ret_answered) {
         code = query_blob(&query, 0, digest, sizeof digest, err);
@@ -83,7 +81,7 @@ static enum ischia_code free_key(struct db *db, const struct store_study_new *wh
 {
     struct query query;
     if (what->idempotency_key == NULL) return ISCHIA_OK;
-    TRY(query_begin(&query, db, SQL_STUDY_KEY_FREE, err));
+    query_begin(&query, db, SQL_STUDY_KEY_FREE);
     query_put_text(&query, what->client);
     query_put_text(&query, what->idempotency_key);
     return query_run(&query, err);
@@ -95,12 +93,12 @@ static enum ischia_code insert_study(struct store *store, struct db *db,
 {
     const struct store_study_new *what = accept->what;
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_ADD, err));
+    query_begin(&query, db, SQL_STUDY_ADD);
     query_put_blob(&query, accept->id.byte, UUID_BYTES);
     query_put_text(&query, what->name);
     query_put_text(&query, what->columns_json);
     query_put_text(&query, what->responses_json);
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_put_integer(&query, store_now_ms(store));
     query_put_text(&query, what->client);
     query_put_text(&query, what->idempotency_key);
     query_put_blob(&query, what->body_digest, STORE_DIGEST_BYTES);
@@ -114,7 +112,7 @@ static enum ischia_code insert_point(struct db *db, int64_t seq, int64_t line,
 {
     const bool refused = point->problem_json != NULL;
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_POINT_ADD, err));
+    query_begin(&query, db, SQL_STUDY_POINT_ADD);
     query_put_integer(&query, seq);
     query_put_integer(&query, line);
     query_put_integer(&query, refused ? QUEUE_FAILED : QUEUE_QUEUED);
@@ -158,7 +156,7 @@ enum ischia_code store_study_accept(struct store *store, const struct store_stud
 {
     struct study_accept accept = {.what = what};
     struct write write = {.run = study_accept_run, .operation = &accept};
-    TRY(uuid_make(sqlite_now_ms(store), &accept.id, err));
+    TRY(uuid_make(store_now_ms(store), &accept.id, err));
     TRY(write_run(store, &write, err));
     *ret = accept.accepted;
     return ISCHIA_OK;
@@ -193,7 +191,7 @@ static enum ischia_code count_points(struct db *db, struct store_study *ret,
                                      struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_COUNT, err));
+    query_begin(&query, db, SQL_STUDY_COUNT);
     query_put_integer(&query, ret->seq);
     enum ischia_code code;
     for (bool row = true;;) {
@@ -213,7 +211,7 @@ static enum ischia_code get_from(struct db *db, const struct uuid *id, struct st
                                  bool *ret_found, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_GET, err));
+    query_begin(&query, db, SQL_STUDY_GET);
     query_put_blob(&query, id->byte, UUID_BYTES);
     enum ischia_code code = query_step(&query, ret_found, err);
     if (code == ISCHIA_OK && *ret_found) code = read_study(&query, ret, err);
@@ -256,7 +254,7 @@ static enum ischia_code list_from(struct db *db, int64_t seq, int limit, store_o
                                   void *context, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_LIST, err));
+    query_begin(&query, db, SQL_STUDY_LIST);
     query_put_integer(&query, seq == 0 ? INT64_MAX : seq);
     query_put_integer(&query, limit);
     enum ischia_code code;
@@ -303,7 +301,7 @@ static enum ischia_code points_from(struct db *db, const struct uuid *id,
                                     struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_POINTS, err));
+    query_begin(&query, db, SQL_STUDY_POINTS);
     query_put_blob(&query, id->byte, UUID_BYTES);
     enum ischia_code code;
     for (bool row = true, more = true;;) {
@@ -361,7 +359,7 @@ static enum ischia_code find_next(struct db *db, struct study_claim *claim, stru
 {
     struct query query;
     struct store_study_claim *c = &claim->claim;
-    TRY(query_begin(&query, db, SQL_STUDY_NEXT, err));
+    query_begin(&query, db, SQL_STUDY_NEXT);
     enum ischia_code code = query_step(&query, &claim->found, err);
     if (code == ISCHIA_OK && claim->found) {
         ret->seq = query_integer(&query, 0);
@@ -383,7 +381,7 @@ static enum ischia_code find_known(struct db *db, const unsigned char *case_key,
     struct query query;
     bool row = false;
     *ret = NULL;
-    TRY(query_begin(&query, db, SQL_STUDY_KNOWN, err));
+    query_begin(&query, db, SQL_STUDY_KNOWN);
     query_put_blob(&query, case_key, STORE_DIGEST_BYTES);
     query_put_blob(&query, case_key, STORE_DIGEST_BYTES);
     enum ischia_code code = query_step(&query, &row, err);
@@ -396,8 +394,8 @@ static enum ischia_code mark_started(struct store *store, struct db *db, int64_t
                                      struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_BEGIN, err));
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_begin(&query, db, SQL_STUDY_BEGIN);
+    query_put_integer(&query, store_now_ms(store));
     query_put_integer(&query, seq);
     return query_run(&query, err);
 }
@@ -407,7 +405,7 @@ static enum ischia_code put_state(struct db *db, int64_t seq, int64_t line, enum
                                   struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_POINT_PUT, err));
+    query_begin(&query, db, SQL_STUDY_POINT_PUT);
     query_put_integer(&query, (int64_t)to);
     query_put_text(&query, outcome_json);
     query_put_integer(&query, started);
@@ -458,7 +456,9 @@ enum ischia_code store_study_claim_next(struct store *store, struct store_study_
         struct write write = {.run = study_claim_run, .operation = &claim};
         const enum ischia_code code = write_run(store, &write, err);
         if (code != ISCHIA_OK) {
+            if (claim.found) *ret = claim.claim; /* perhaps it was committed all the same */
             forget_claim(&claim);
+            ret->case_json = NULL;
             return code;
         }
     } while (claim.again);
@@ -488,7 +488,7 @@ static enum ischia_code find_point(struct db *db, const struct study_settle *set
                                    struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_POINT_GET, err));
+    query_begin(&query, db, SQL_STUDY_POINT_GET);
     query_put_blob(&query, settle->id.byte, UUID_BYTES);
     query_put_integer(&query, settle->line);
     const enum ischia_code code = query_step(&query, ret_found, err);
@@ -555,11 +555,11 @@ static enum ischia_code study_cancel_run(struct store *store, struct db *db, voi
     TRY(number_by(db, SQL_STUDY_OVER, NULL, seq, &over, err));
     if (over == 1) change->answer = STORE_CONFLICT; /* 2: cancelled before */
     if (over != 0) return ISCHIA_OK;
-    TRY(query_begin(&query, db, SQL_STUDY_CANCEL_POINTS, err));
+    query_begin(&query, db, SQL_STUDY_CANCEL_POINTS);
     query_put_integer(&query, seq);
     TRY(query_run(&query, err));
-    TRY(query_begin(&query, db, SQL_STUDY_CANCEL, err));
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_begin(&query, db, SQL_STUDY_CANCEL);
+    query_put_integer(&query, store_now_ms(store));
     query_put_integer(&query, seq);
     return query_run(&query, err);
 }
@@ -577,7 +577,7 @@ enum ischia_code store_study_cancel(struct store *store, const struct uuid *id,
 static enum ischia_code drop_study(struct db *db, int64_t seq, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STUDY_ERASE, err));
+    query_begin(&query, db, SQL_STUDY_ERASE);
     query_put_integer(&query, seq);
     return query_run(&query, err);
 }
@@ -618,7 +618,7 @@ static enum ischia_code study_retire_run(struct store *store, struct db *db, voi
 {
     struct study_retire *retire = operation;
     int64_t seq = 0;
-    const int64_t before_ms = sqlite_now_ms(store) - retire->age_max_ms;
+    const int64_t before_ms = store_now_ms(store) - retire->age_max_ms;
     TRY(number_by(db, SQL_STUDY_TOO_OLD, NULL, before_ms, &seq, err));
     retire->erased = seq >= 0;
     return retire->erased ? drop_study(db, seq, err) : ISCHIA_OK;

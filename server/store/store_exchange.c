@@ -2,7 +2,7 @@
 /* The outbox of what record systems are still to be told, and what they answered to cards. */
 #include <string.h>
 
-#include "server/store/store_sqlite.h"
+#include "server/store/engine.h"
 
 /* -------------------------------------------------------------------------------- outbox */
 
@@ -20,7 +20,7 @@ static enum ischia_code target_run(struct store *store, struct db *db, void *ope
     (void)store;
     for (int i = 0; i < change->count; i++) {
         struct query query;
-        TRY(query_begin(&query, db, change->sql[i], err));
+        query_begin(&query, db, change->sql[i]);
         query_put_text(&query, change->target);
         TRY(query_run(&query, err));
     }
@@ -73,7 +73,7 @@ static enum ischia_code next_from(struct db *db, const char *target, struct stor
                                   int64_t *ret_due_ms, bool *ret_found, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_OUTBOX_NEXT, err));
+    query_begin(&query, db, SQL_OUTBOX_NEXT);
     query_put_text(&query, target);
     enum ischia_code code = query_step(&query, ret_found, err);
     if (code == ISCHIA_OK && *ret_found) code = read_delivery(&query, ret, ret_due_ms, err);
@@ -111,7 +111,7 @@ static enum ischia_code row_run(struct store *store, struct db *db, void *operat
     const struct row_write *row = operation;
     struct query query;
     (void)store;
-    TRY(query_begin(&query, db, row->done ? SQL_OUTBOX_DONE : SQL_OUTBOX_RETRY, err));
+    query_begin(&query, db, row->done ? SQL_OUTBOX_DONE : SQL_OUTBOX_RETRY);
     if (!row->done) {
         query_put_integer(&query, row->due_ms);
         query_put_integer(&query, row->give_up);
@@ -136,17 +136,11 @@ enum ischia_code store_outbox_retry(struct store *store, int64_t seq, int64_t du
     return write_run(store, &write, err);
 }
 
-static void copy_text(struct query *query, int column, char *ret, size_t size)
-{
-    const char *text = (const char *)sqlite3_column_text(query->statement, column);
-    (void)sqlite3_snprintf((int)size, ret, "%s", text == NULL ? "" : text);
-}
-
 static enum ischia_code list_outbox(struct db *db, store_on_outbox *on_row, void *context,
                                     struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_OUTBOX_LIST, err));
+    query_begin(&query, db, SQL_OUTBOX_LIST);
     enum ischia_code code;
     for (bool more = true;;) {
         struct store_outbox_row row = {0};
@@ -154,9 +148,9 @@ static enum ischia_code list_outbox(struct db *db, store_on_outbox *on_row, void
         if (code == ISCHIA_OK && more)
             code = read_delivery(&query, &row.delivery, &row.due_ms, err);
         if (code != ISCHIA_OK || !more) break;
-        copy_text(&query, 7, row.target, sizeof row.target);
+        query_copy_text(&query, 7, row.target, sizeof row.target);
         row.given_up = query_integer(&query, 8) != 0;
-        copy_text(&query, 9, row.problem, sizeof row.problem);
+        query_copy_text(&query, 9, row.problem, sizeof row.problem);
         if (!on_row(context, &row)) break;
     }
     query_end(&query);
@@ -177,10 +171,11 @@ static enum ischia_code revive_run(struct store *store, struct db *db, void *ope
                                    struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_OUTBOX_REVIVE, err));
-    query_put_integer(&query, sqlite_now_ms(store));
-    TRY(query_run(&query, err));
-    *(int *)operation = sqlite3_changes(db->handle);
+    query_begin(&query, db, SQL_OUTBOX_REVIVE);
+    query_put_integer(&query, store_now_ms(store));
+    int64_t revived = 0;
+    TRY(query_change(&query, &revived, err));
+    *(int *)operation = (int)revived;
     return ISCHIA_OK;
 }
 
@@ -203,8 +198,8 @@ static enum ischia_code feedback_run(struct store *store, struct db *db, void *o
     const struct feedback_write *add = operation;
     for (size_t i = 0; i < add->count; i++) {
         struct query query;
-        TRY(query_begin(&query, db, SQL_FEEDBACK_ADD, err));
-        query_put_integer(&query, sqlite_now_ms(store));
+        query_begin(&query, db, SQL_FEEDBACK_ADD);
+        query_put_integer(&query, store_now_ms(store));
         query_put_text(&query, add->rows[i].service);
         query_put_blob(&query, add->rows[i].card.byte, UUID_BYTES);
         query_put_text(&query, add->rows[i].document);
@@ -225,16 +220,16 @@ static enum ischia_code list_feedback(struct db *db, store_on_feedback *on_row, 
                                       struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_FEEDBACK_LIST, err));
+    query_begin(&query, db, SQL_FEEDBACK_LIST);
     enum ischia_code code;
     for (bool more = true;;) {
         struct store_feedback row = {0};
         code = query_step(&query, &more, err);
         if (code != ISCHIA_OK || !more) break;
         row.at_ms = query_integer(&query, 0);
-        row.service = (const char *)sqlite3_column_text(query.statement, 1);
+        row.service = query_peek_text(&query, 1);
         code = query_blob(&query, 2, row.card.byte, UUID_BYTES, err);
-        row.document = (const char *)sqlite3_column_text(query.statement, 3);
+        row.document = query_peek_text(&query, 3);
         if (code != ISCHIA_OK || !on_row(context, &row)) break;
     }
     query_end(&query);

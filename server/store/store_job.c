@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "server/store/store_sqlite.h"
+#include "server/store/engine.h"
 
 const char *const store_change_names[STORE_CHANGE_KIND_COUNT] = {
     [STORE_CHANGE_CREATED] = "created",   [STORE_CHANGE_STARTED] = "started",
@@ -19,13 +19,11 @@ enum ischia_code change_add(struct store *store, struct db *db, enum store_chang
                             const struct uuid *id, int64_t *ret_seq, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_CHANGE_ADD, err));
+    query_begin(&query, db, SQL_CHANGE_ADD);
     query_put_integer(&query, (int64_t)kind);
     query_put_blob(&query, id->byte, UUID_BYTES);
-    query_put_integer(&query, sqlite_now_ms(store));
-    TRY(query_run(&query, err));
-    *ret_seq = sqlite3_last_insert_rowid(db->handle);
-    return ISCHIA_OK;
+    query_put_integer(&query, store_now_ms(store));
+    return query_number(&query, 0, ret_seq, err);
 }
 
 /* *ret_rowid is 0 when the case has not been solved. */
@@ -33,23 +31,33 @@ static enum ischia_code find_solution(struct db *db, const unsigned char *case_k
                                       int64_t *ret_rowid, struct ischia_error *err)
 {
     struct query query;
-    bool row = false;
-    TRY(query_begin(&query, db, SQL_SOLUTION_FIND, err));
+    query_begin(&query, db, SQL_SOLUTION_FIND);
     query_put_blob(&query, case_key, STORE_DIGEST_BYTES);
-    const enum ischia_code code = query_step(&query, &row, err);
-    if (code == ISCHIA_OK) *ret_rowid = row ? query_integer(&query, 0) : 0;
-    query_end(&query);
-    return code;
+    return query_number(&query, 0, ret_rowid, err);
 }
 
 static enum ischia_code count_queued(struct db *db, int *ret, struct ischia_error *err)
 {
     struct query query;
+    int64_t queued = 0;
+    query_begin(&query, db, SQL_QUEUED);
+    TRY(query_number(&query, 0, &queued, err));
+    *ret = (int)queued;
+    return ISCHIA_OK;
+}
+
+/* find_solution and count_queued at once. */
+static enum ischia_code look_before_accepting(struct db *db, const unsigned char *case_key,
+                                              int64_t *ret_rowid, int *ret_queued,
+                                              struct ischia_error *err)
+{
+    struct query query;
     bool row = false;
-    TRY(query_begin(&query, db, SQL_TALLY, err));
-    query_put_integer(&query, QUEUE_QUEUED);
+    query_begin(&query, db, SQL_ACCEPT_LOOK);
+    query_put_blob(&query, case_key, STORE_DIGEST_BYTES);
     const enum ischia_code code = query_step(&query, &row, err);
-    if (code == ISCHIA_OK) *ret = row ? (int)query_integer(&query, 0) : 0;
+    *ret_queued = code == ISCHIA_OK && row ? (int)query_integer(&query, 0) : 0;
+    *ret_rowid = code == ISCHIA_OK && row ? query_integer(&query, 1) : 0;
     query_end(&query);
     return code;
 }
@@ -72,10 +80,10 @@ static enum ischia_code look_up_key(struct store *store, struct db *db, struct a
     *ret_answered = false;
     if (accept->what.idempotency_key == NULL) return ISCHIA_OK;
     struct query query;
-    TRY(query_begin(&query, db, SQL_KEY_FIND, err));
+    query_begin(&query, db, SQL_KEY_FIND);
     query_put_text(&query, accept->what.client);
     query_put_text(&query, accept->what.idempotency_key);
-    query_put_integer(&query, sqlite_now_ms(store) - store->idempotency_ms);
+    query_put_integer(&query, store_now_ms(store) - store->idempotency_ms);
     unsigned char digest[STORE_DIGEST_BYTES];
     struct store_accepted *ret = &accept->accepted;
     enum ischia_code code = query_step(&query, ret_answered, err);
@@ -97,7 +105,7 @@ static enum ischia_code remember_key(struct db *db, const struct accept *accept,
 {
     if (accept->what.idempotency_key == NULL) return ISCHIA_OK;
     struct query query;
-    TRY(query_begin(&query, db, SQL_KEY_PUT, err));
+    query_begin(&query, db, SQL_KEY_PUT);
     query_put_text(&query, accept->what.client);
     query_put_text(&query, accept->what.idempotency_key);
     query_put_blob(&query, accept->what.body_digest, STORE_DIGEST_BYTES);
@@ -113,7 +121,7 @@ static enum ischia_code insert_assessment(struct db *db, const struct accept *ac
     const struct store_new *what = &accept->what;
     const int64_t now_ms = accept->accepted.created_ms;
     struct query query;
-    TRY(query_begin(&query, db, SQL_ACCEPT, err));
+    query_begin(&query, db, SQL_ACCEPT);
     query_put_integer(&query, seq);
     query_put_blob(&query, accept->id.byte, UUID_BYTES);
     query_put_integer(&query, (int64_t)accept->accepted.state);
@@ -141,7 +149,7 @@ static enum ischia_code insert_origin(struct db *db, const struct store_new *wha
 {
     struct query query;
     if (what->origin_json == NULL) return ISCHIA_OK;
-    TRY(query_begin(&query, db, SQL_ORIGIN_ADD, err));
+    query_begin(&query, db, SQL_ORIGIN_ADD);
     query_put_integer(&query, seq);
     query_put_text(&query, what->reference);
     query_put_text(&query, what->origin_json);
@@ -155,7 +163,7 @@ static enum ischia_code accept_new(struct store *store, struct db *db, struct ac
     ret->acceptance = solution != 0 ? STORE_CACHED : STORE_ACCEPTED;
     ret->state = solution != 0 ? QUEUE_SUCCEEDED : QUEUE_QUEUED;
     ret->id = accept->id;
-    ret->created_ms = sqlite_now_ms(store);
+    ret->created_ms = store_now_ms(store);
     int64_t seq = 0;
     TRY(change_add(store, db, STORE_CHANGE_CREATED, &accept->id, &seq, err));
     int64_t change_seq = seq;
@@ -176,8 +184,7 @@ static enum ischia_code accept_run(struct store *store, struct db *db, void *ope
     if (answered) return count_queued(db, &accept->accepted.queued, err);
     int64_t solution = 0;
     int queued = 0;
-    TRY(find_solution(db, accept->what.case_key, &solution, err));
-    TRY(count_queued(db, &queued, err));
+    TRY(look_before_accepting(db, accept->what.case_key, &solution, &queued, err));
     const int queued_max = accept->what.queued_max;
     if (solution == 0 && queued_max > 0 && queued >= queued_max) {
         accept->accepted.acceptance = STORE_FULL;
@@ -195,7 +202,7 @@ enum ischia_code store_accept(struct store *store, const struct store_new *what,
     struct accept accept = {.what = *what};
     accept.write = (struct write){.run = accept_run, .operation = &accept};
     if (accept.what.client == NULL) accept.what.client = "";
-    TRY(uuid_make(sqlite_now_ms(store), &accept.id, err));
+    TRY(uuid_make(store_now_ms(store), &accept.id, err));
     TRY(write_run(store, &accept.write, err));
     *ret = accept.accepted;
     return ISCHIA_OK;
@@ -251,7 +258,7 @@ enum ischia_code store_accept_later(struct store *store, const struct store_new 
     accept->done = done;
     accept->context = context;
     accept->write = (struct write){.run = accept_run, .operation = accept, .done = accept_done};
-    enum ischia_code code = uuid_make(sqlite_now_ms(store), &accept->id, err);
+    enum ischia_code code = uuid_make(store_now_ms(store), &accept->id, err);
     if (code == ISCHIA_OK) code = write_later(store, &accept->write, err);
     if (code != ISCHIA_OK) free(accept);
     return code;
@@ -270,7 +277,7 @@ static enum ischia_code find_present(struct db *db, const struct uuid *id, struc
                                      bool *ret_found, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_STATE, err));
+    query_begin(&query, db, SQL_STATE);
     query_put_blob(&query, id->byte, UUID_BYTES);
     enum ischia_code code = query_step(&query, ret_found, err);
     if (code == ISCHIA_OK && *ret_found) {
@@ -314,14 +321,12 @@ static enum ischia_code put_solution(struct store *store, struct db *db,
     TRY(find_solution(db, case_key, ret_rowid, err));
     if (*ret_rowid != 0) return ISCHIA_OK;
     struct query query;
-    TRY(query_begin(&query, db, SQL_SOLUTION_ADD, err));
+    query_begin(&query, db, SQL_SOLUTION_ADD);
     query_put_blob(&query, case_key, STORE_DIGEST_BYTES);
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_put_integer(&query, store_now_ms(store));
     query_put_text(&query, step->text);
     query_put_blob(&query, step->field, step->field_size);
-    TRY(query_run(&query, err));
-    *ret_rowid = sqlite3_last_insert_rowid(db->handle);
-    return ISCHIA_OK;
+    return query_number(&query, 0, ret_rowid, err);
 }
 
 static enum ischia_code mark_succeeded(struct store *store, struct db *db, int64_t seq,
@@ -329,10 +334,10 @@ static enum ischia_code mark_succeeded(struct store *store, struct db *db, int64
                                        struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_SUCCEED, err));
+    query_begin(&query, db, SQL_SUCCEED);
     query_put_integer(&query, solution);
     query_put_integer(&query, cached);
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_put_integer(&query, store_now_ms(store));
     query_put_integer(&query, change_seq);
     query_put_integer(&query, seq);
     return query_run(&query, err);
@@ -349,16 +354,16 @@ static enum ischia_code write_step(struct store *store, struct db *db, const str
         TRY(put_solution(store, db, now->case_key, step, &solution, err));
         return mark_succeeded(store, db, now->seq, change_seq, solution, false, err);
     case QUEUE_FAILED:
-        TRY(query_begin(&query, db, SQL_FAIL, err));
+        query_begin(&query, db, SQL_FAIL);
         query_put_text(&query, step->text);
-        query_put_integer(&query, sqlite_now_ms(store));
+        query_put_integer(&query, store_now_ms(store));
         break;
     case QUEUE_CANCELLED:
-        TRY(query_begin(&query, db, SQL_CANCEL, err));
-        query_put_integer(&query, sqlite_now_ms(store));
+        query_begin(&query, db, SQL_CANCEL);
+        query_put_integer(&query, store_now_ms(store));
         break;
     default: /* QUEUE_QUEUED: back into the queue */
-        TRY(query_begin(&query, db, SQL_REQUEUE, err));
+        query_begin(&query, db, SQL_REQUEUE);
         query_put_integer(&query, step->crashed);
         break;
     }
@@ -456,7 +461,7 @@ static enum ischia_code find_next(struct db *db, struct claim *claim, struct nex
                                   struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_NEXT, err));
+    query_begin(&query, db, SQL_NEXT);
     enum ischia_code code = query_step(&query, &claim->found, err);
     if (code == ISCHIA_OK && claim->found) {
         code = query_blob(&query, 0, claim->claim.id.byte, UUID_BYTES, err);
@@ -476,8 +481,8 @@ static enum ischia_code start_job(struct store *store, struct db *db, const stru
     int64_t change_seq = 0;
     TRY(change_add(store, db, STORE_CHANGE_STARTED, &claim->claim.id, &change_seq, err));
     struct query query;
-    TRY(query_begin(&query, db, SQL_START, err));
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_begin(&query, db, SQL_START);
+    query_put_integer(&query, store_now_ms(store));
     query_put_integer(&query, change_seq);
     query_put_integer(&query, seq);
     return query_run(&query, err);
@@ -528,7 +533,9 @@ enum ischia_code store_claim_next(struct store *store,
         struct write write = {.run = claim_run, .operation = &claim};
         const enum ischia_code code = write_run(store, &write, err);
         if (code != ISCHIA_OK) {
+            if (claim.found) *ret = claim.claim; /* perhaps it was committed all the same */
             forget_claim(&claim);
+            ret->case_json = NULL;
             return code;
         }
         for (int i = 0; i < claim.cached_count; i++) on_cached(context, &claim.cached[i]);
@@ -544,7 +551,7 @@ static enum ischia_code find_running(struct db *db, struct uuid *ret_id, bool *r
                                      struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_RUNNING, err));
+    query_begin(&query, db, SQL_RUNNING);
     enum ischia_code code = query_step(&query, ret_found, err);
     if (code == ISCHIA_OK && *ret_found)
         code = query_blob(&query, 0, ret_id->byte, UUID_BYTES, err);
@@ -584,7 +591,7 @@ static enum ischia_code drop_row(struct db *db, enum sql sql, int64_t rowid,
                                  struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, sql, err));
+    query_begin(&query, db, sql);
     query_put_integer(&query, rowid);
     return query_run(&query, err);
 }
@@ -631,8 +638,8 @@ find_unwanted(struct store *store, struct db *db, const struct store_retention *
     *ret_found = false;
     if (!too_many && rule->age_max_ms <= 0) return ISCHIA_OK;
     struct query query;
-    TRY(query_begin(&query, db, too_many ? SQL_TOO_MANY : SQL_TOO_OLD, err));
-    if (!too_many) query_put_integer(&query, sqlite_now_ms(store) - rule->age_max_ms);
+    query_begin(&query, db, too_many ? SQL_TOO_MANY : SQL_TOO_OLD);
+    if (!too_many) query_put_integer(&query, store_now_ms(store) - rule->age_max_ms);
     enum ischia_code code = query_step(&query, ret_found, err);
     if (code == ISCHIA_OK && *ret_found)
         code = query_blob(&query, 0, ret_id->byte, UUID_BYTES, err);
@@ -645,9 +652,11 @@ static enum ischia_code retire_run(struct store *store, struct db *db, void *ope
 {
     struct retire *retire = operation;
     retire->erased = 0;
-    TRY(drop_row(db, SQL_KEY_EXPIRE, sqlite_now_ms(store) - store->idempotency_ms, err));
+    TRY(drop_row(db, SQL_KEY_EXPIRE, store_now_ms(store) - store->idempotency_ms, err));
     int64_t finished = 0;
-    TRY(db_number(db, "SELECT sum(n) FROM tally WHERE state >= 2", &finished, err));
+    struct query query;
+    query_begin(&query, db, SQL_FINISHED);
+    TRY(query_number(&query, 0, &finished, err));
     while (retire->erased < retire->batch) {
         struct erase erase = {0};
         bool found = false;

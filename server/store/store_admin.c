@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/digest.h"
-#include "server/store/store_sqlite.h"
+#include "server/store/engine.h"
 
 /* -------------------------------------------------------------------------------- tokens */
 
@@ -17,15 +18,16 @@ static enum ischia_code token_add_run(struct store *store, struct db *db, void *
 {
     struct token_write *add = operation;
     struct query query;
-    TRY(query_begin(&query, db, SQL_TOKEN_ADD, err));
+    query_begin(&query, db, SQL_TOKEN_ADD);
     query_put_text(&query, add->token.id);
     query_put_text(&query, add->token.name);
     query_put_blob(&query, add->token.digest, STORE_DIGEST_BYTES);
     query_put_integer(&query, add->token.scopes);
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_put_integer(&query, store_now_ms(store));
     query_put_integer(&query, add->token.expires_ms);
-    TRY(query_run(&query, err));
-    add->answer = sqlite3_changes(db->handle) == 1 ? STORE_DONE : STORE_CONFLICT;
+    int64_t added = 0;
+    TRY(query_change(&query, &added, err));
+    add->answer = added == 1 ? STORE_DONE : STORE_CONFLICT;
     return ISCHIA_OK;
 }
 
@@ -39,16 +41,11 @@ enum ischia_code store_token_add(struct store *store, const struct store_token *
     return ISCHIA_OK;
 }
 
-static void copy_text(char *ret, size_t size, const void *text)
-{
-    (void)sqlite3_snprintf((int)size, ret, "%s", text == NULL ? "" : (const char *)text);
-}
-
 static enum ischia_code read_token(struct query *query, struct store_token *ret,
                                    struct ischia_error *err)
 {
-    copy_text(ret->id, sizeof ret->id, sqlite3_column_text(query->statement, 0));
-    copy_text(ret->name, sizeof ret->name, sqlite3_column_text(query->statement, 1));
+    query_copy_text(query, 0, ret->id, sizeof ret->id);
+    query_copy_text(query, 1, ret->name, sizeof ret->name);
     TRY(query_blob(query, 2, ret->digest, STORE_DIGEST_BYTES, err));
     ret->scopes = (uint32_t)query_integer(query, 3);
     ret->created_ms = query_integer(query, 4);
@@ -61,7 +58,7 @@ static enum ischia_code find_token(struct db *db, const char *id, struct store_t
                                    bool *ret_found, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_TOKEN_GET, err));
+    query_begin(&query, db, SQL_TOKEN_GET);
     query_put_text(&query, id);
     enum ischia_code code = query_step(&query, ret_found, err);
     if (code == ISCHIA_OK && *ret_found) code = read_token(&query, ret, err);
@@ -94,8 +91,8 @@ static enum ischia_code token_revoke_run(struct store *store, struct db *db, voi
     revoke->answer = found ? STORE_CONFLICT : STORE_NOT_FOUND;
     if (!found || present.revoked_ms != 0) return ISCHIA_OK;
     struct query query;
-    TRY(query_begin(&query, db, SQL_TOKEN_REVOKE, err));
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_begin(&query, db, SQL_TOKEN_REVOKE);
+    query_put_integer(&query, store_now_ms(store));
     query_put_text(&query, revoke->token.id);
     TRY(query_run(&query, err));
     revoke->answer = STORE_DONE;
@@ -109,7 +106,7 @@ enum ischia_code store_token_revoke(struct store *store, const char *id,
     struct write write = {.run = token_revoke_run, .operation = &revoke};
     *ret_answer = STORE_NOT_FOUND;
     if (strlen(id) >= sizeof revoke.token.id) return ISCHIA_OK;
-    copy_text(revoke.token.id, sizeof revoke.token.id, id);
+    (void)stpcpy(revoke.token.id, id);
     TRY(write_run(store, &write, err));
     *ret_answer = revoke.answer;
     return ISCHIA_OK;
@@ -119,7 +116,7 @@ static enum ischia_code show_tokens(struct db *db, store_on_token *on_token, voi
                                     struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_TOKEN_LIST, err));
+    query_begin(&query, db, SQL_TOKEN_LIST);
     enum ischia_code code;
     for (bool more = true;;) {
         struct store_token token = {0};
@@ -146,14 +143,9 @@ enum ischia_code store_token_epoch(struct store *store, int64_t *ret_epoch,
 {
     struct db *db = NULL;
     struct query query;
-    bool row = false;
     TRY(reader_take(store, &db, err));
-    enum ischia_code code = query_begin(&query, db, SQL_TOKEN_EPOCH, err);
-    if (code == ISCHIA_OK) {
-        code = query_step(&query, &row, err);
-        if (code == ISCHIA_OK) *ret_epoch = row ? query_integer(&query, 0) : 0;
-        query_end(&query);
-    }
+    query_begin(&query, db, SQL_TOKEN_EPOCH);
+    const enum ischia_code code = query_number(&query, 0, ret_epoch, err);
     reader_give(store, db);
     return code;
 }
@@ -166,8 +158,8 @@ static void chain(const unsigned char before[STORE_DIGEST_BYTES], const struct s
                   unsigned char ret_hash[STORE_DIGEST_BYTES])
 {
     char seq[24], at_ms[24];
-    (void)sqlite3_snprintf(sizeof seq, seq, "%lld", (long long)row->seq);
-    (void)sqlite3_snprintf(sizeof at_ms, at_ms, "%lld", (long long)row->at_ms);
+    (void)snprintf(seq, sizeof seq, "%lld", (long long)row->seq);
+    (void)snprintf(at_ms, sizeof at_ms, "%lld", (long long)row->at_ms);
     const struct digest_part parts[] = {
         {before, STORE_DIGEST_BYTES}, digest_text(seq),         digest_text(at_ms),
         digest_text(row->who),        digest_text(row->what),   digest_text(row->subject),
@@ -176,21 +168,21 @@ static void chain(const unsigned char before[STORE_DIGEST_BYTES], const struct s
     digest_parts(parts, sizeof parts / sizeof parts[0], ret_hash);
 }
 
-static enum ischia_code audit_head(struct db *db, int64_t *ret_seq,
-                                   unsigned char ret_hash[STORE_DIGEST_BYTES],
-                                   struct ischia_error *err)
+/* Asked once in a transaction: nobody else writes meanwhile. */
+static enum ischia_code find_head(struct db *db, struct audit_head *head, struct ischia_error *err)
 {
     struct query query;
     bool row = false;
-    *ret_seq = 0;
-    memset(ret_hash, 0, STORE_DIGEST_BYTES);
-    TRY(query_begin(&query, db, SQL_AUDIT_HEAD, err));
+    if (head->known) return ISCHIA_OK;
+    *head = (struct audit_head){0};
+    query_begin(&query, db, SQL_AUDIT_HEAD);
     enum ischia_code code = query_step(&query, &row, err);
     if (code == ISCHIA_OK && row) {
-        *ret_seq = query_integer(&query, 0);
-        code = query_blob(&query, 1, ret_hash, STORE_DIGEST_BYTES, err);
+        head->seq = query_integer(&query, 0);
+        code = query_blob(&query, 1, head->hash, STORE_DIGEST_BYTES, err);
     }
     query_end(&query);
+    head->known = code == ISCHIA_OK;
     return code;
 }
 
@@ -198,13 +190,14 @@ static enum ischia_code audit_run(struct store *store, struct db *db, void *oper
                                   struct ischia_error *err)
 {
     struct store_audit *row = operation;
-    unsigned char before[STORE_DIGEST_BYTES];
-    TRY(audit_head(db, &row->seq, before, err));
-    row->seq++;
-    row->at_ms = sqlite_now_ms(store);
-    chain(before, row, row->hash);
+    struct audit_head *head = &store->audit_head;
+    TRY(find_head(db, head, err));
+    row->seq = ++head->seq;
+    row->at_ms = store_now_ms(store);
+    chain(head->hash, row, row->hash);
+    memcpy(head->hash, row->hash, STORE_DIGEST_BYTES);
     struct query query;
-    TRY(query_begin(&query, db, SQL_AUDIT_ADD, err));
+    query_begin(&query, db, SQL_AUDIT_ADD);
     query_put_integer(&query, row->seq);
     query_put_integer(&query, row->at_ms);
     query_put_text(&query, row->who);
@@ -269,7 +262,7 @@ static enum ischia_code show_audit(struct db *db, int64_t since, store_on_audit 
                                    void *context, struct ischia_error *err)
 {
     struct query query;
-    TRY(query_begin(&query, db, SQL_AUDIT_LIST, err));
+    query_begin(&query, db, SQL_AUDIT_LIST);
     query_put_integer(&query, since);
     enum ischia_code code;
     for (bool more = true;;) {
@@ -277,8 +270,7 @@ static enum ischia_code show_audit(struct db *db, int64_t since, store_on_audit 
         struct store_audit row = {0};
         code = query_step(&query, &more, err);
         if (code != ISCHIA_OK || !more) break;
-        for (int i = 0; i < 5; i++)
-            text[i] = (const char *)sqlite3_column_text(query.statement, 2 + i);
+        for (int i = 0; i < 5; i++) text[i] = query_peek_text(&query, 2 + i);
         row = (struct store_audit){.seq = query_integer(&query, 0),
                                    .at_ms = query_integer(&query, 1),
                                    .who = text[0],
@@ -333,8 +325,8 @@ static enum ischia_code probe_run(struct store *store, struct db *db, void *oper
 {
     (void)operation;
     struct query query;
-    TRY(query_begin(&query, db, SQL_PROBE, err));
-    query_put_integer(&query, sqlite_now_ms(store));
+    query_begin(&query, db, SQL_PROBE);
+    query_put_integer(&query, store_now_ms(store));
     return query_run(&query, err);
 }
 

@@ -8,9 +8,9 @@
 #include <string.h>
 #include <time.h>
 
-#include "server/store/store_sqlite.h"
+#include "server/store/engine.h"
 
-enum { BATCH_MAX = 512, SCRUB_WAIT_MS = 100, SCRUB_AGAIN_S = 1 };
+enum { SCRUB_AGAIN_S = 1 };
 
 const double store_latency_bound_ms[STORE_LATENCY_BUCKETS - 1] = {
     0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 250.0, 1000.0, 5000.0,
@@ -25,26 +25,19 @@ static double monotonic_ms(void)
 
 /* ------------------------------------------------------------------------- transactions */
 
-static void roll_back(struct db *db)
-{
-    /* after some failures (disk full) SQLite has rolled back by itself */
-    if (sqlite3_get_autocommit(db->handle) == 0) (void)!db_run(db, SQL_ROLLBACK, NULL);
-}
-
-/* One write between savepoints. A code means that the whole transaction is lost; the write's own
- * failure is in write->code. */
+/* One write. A code means that the whole transaction is lost; the write's own failure is in
+ * write->code. */
 static enum ischia_code run_one(struct store *store, struct write *write, struct ischia_error *err)
 {
     struct db *db = store->writer;
-    TRY(db_run(db, SQL_SAVEPOINT, err));
+    const struct engine *engine = store->engine;
+    if (engine->undoes_one) TRY(engine->mark(db, err));
     write->code = write->run(store, db, write->operation, &write->err);
-    if (write->code == ISCHIA_OK) return db_run(db, SQL_SAVEPOINT_DONE, err);
-    if (sqlite3_get_autocommit(db->handle) != 0) {
-        if (err != NULL) *err = write->err;
-        return write->code;
-    }
-    TRY(db_run(db, SQL_SAVEPOINT_UNDO, err));
-    return db_run(db, SQL_SAVEPOINT_DONE, err);
+    const bool kept = write->code == ISCHIA_OK;
+    store->audit_head.known &= kept; /* it may have been moved by what is undone */
+    if (engine->undoes_one && engine->is_in_transaction(db)) return engine->keep(db, !kept, err);
+    if (!kept && err != NULL) *err = write->err;
+    return write->code;
 }
 
 /* Inside a transaction that has begun; ends it. */
@@ -52,38 +45,26 @@ static enum ischia_code run_batch(struct store *store, struct write *first, stru
                                   struct ischia_error *err)
 {
     enum ischia_code code = ISCHIA_OK;
+    store->audit_head.known = false;
     for (struct write *w = first; w != end && code == ISCHIA_OK; w = w->next)
         code = run_one(store, w, err);
-    if (code == ISCHIA_OK) code = db_run(store->writer, SQL_COMMIT, err);
-    if (code != ISCHIA_OK) roll_back(store->writer);
+    if (code == ISCHIA_OK) code = store->engine->commit(store->writer, err);
+    if (code != ISCHIA_OK) store->engine->roll_back(store->writer);
     return code;
 }
 
-/* Each in a commit of its own: one that is too large for the disk must not fail its neighbours. */
+/* Each in a commit of its own: one that is too large for the disk must not fail its neighbours. A
+ * commit on a connection that was lost may have been made or not: nobody is told that it was. */
 static void run_singly(struct store *store, struct write *first, struct write *end)
 {
     for (struct write *w = first; w != end; w = w->next) {
         struct ischia_error err = {0};
-        enum ischia_code code = db_run(store->writer, SQL_BEGIN, &err);
+        enum ischia_code code = store->engine->begin(store, store->writer, &err);
         if (code == ISCHIA_OK) code = run_batch(store, w, w->next, &err);
         if (code == ISCHIA_OK) continue;
         w->code = code;
         w->err = err;
     }
-}
-
-/* ------------------------------------------------------------------------------ scrubbing */
-
-/* Erased rows are overwritten in the database (secure_delete), but older pages that held them are
- * in the write-ahead log until it is emptied. A long read can delay that; it is tried again. */
-static void scrub(struct store *store)
-{
-    sqlite3_busy_timeout(store->writer->handle, SCRUB_WAIT_MS);
-    int64_t busy = 1;
-    if (db_number(store->writer, "PRAGMA wal_checkpoint(TRUNCATE)", &busy, NULL) != ISCHIA_OK)
-        busy = 1;
-    sqlite3_busy_timeout(store->writer->handle, store->busy_timeout_ms);
-    store->scrub = busy != 0;
 }
 
 /* ------------------------------------------------------------------------------ the thread */
@@ -122,16 +103,20 @@ static void finish_batch(struct store *store, struct write *first, struct write 
 static void commit_batch(struct store *store, struct write *first, struct write *end)
 {
     struct ischia_error err = {0};
-    const enum ischia_code begun = db_run(store->writer, SQL_BEGIN, &err);
-    if (begun == ISCHIA_OK && run_batch(store, first, end, &err) != ISCHIA_OK)
+    enum ischia_code code = store->engine->begin(store, store->writer, &err);
+    const bool begun = code == ISCHIA_OK;
+    if (begun) code = run_batch(store, first, end, &err);
+    if (begun && code != ISCHIA_OK && !store->engine->is_lost(store->writer)) {
         run_singly(store, first, end);
-    for (struct write *w = first; begun != ISCHIA_OK && w != end; w = w->next) {
-        w->code = begun;
+        code = ISCHIA_OK;
+    }
+    for (struct write *w = first; code != ISCHIA_OK && w != end; w = w->next) {
+        w->code = code;
         w->err = err;
     }
     for (struct write *w = first; w != end; w = w->next)
-        store->scrub |= w->erases && w->code == ISCHIA_OK;
-    if (store->scrub) scrub(store);
+        store->scrub |= w->erases && w->code == ISCHIA_OK && store->engine->scrub != NULL;
+    if (store->scrub) store->engine->scrub(store);
     note_batch(store, first, end);
     finish_batch(store, first, end);
 }
@@ -158,10 +143,10 @@ static struct write *take_waiting(struct store *store, bool *ret_closing)
     return first;
 }
 
-static struct write *batch_end(struct write *first)
+static struct write *batch_end(struct write *first, int most)
 {
     int count = 0;
-    while (first != NULL && count++ < BATCH_MAX) first = first->next;
+    while (first != NULL && count++ < most) first = first->next;
     return first;
 }
 
@@ -174,9 +159,9 @@ static void *writer_main(void *argument)
     for (bool closing = false;;) {
         struct write *first = take_waiting(store, &closing);
         if (first == NULL && closing) return NULL;
-        if (first == NULL && store->scrub) scrub(store);
+        if (first == NULL && store->scrub) store->engine->scrub(store);
         while (first != NULL) {
-            struct write *end = batch_end(first);
+            struct write *end = batch_end(first, store->engine->batch_max);
             commit_batch(store, first, end);
             first = end;
         }
