@@ -22,9 +22,11 @@ enum { WORKER_FD = 3, EXIT_NOT_EXECUTABLE = 127, EXIT_NOT_SET_UP = 126 };
 static const char *const fixed_environment[] = {"PATH=/usr/bin:/bin", "LANG=C.UTF-8",
                                                 "OPENBLAS_NUM_THREADS=1", "OMP_NUM_THREADS=1",
                                                 "OMP_THREAD_LIMIT=1"};
-/* What sanitizer and coverage builds need to be told. */
-static const char *const passed_environment[] = {"ASAN_OPTIONS", "UBSAN_OPTIONS", "TSAN_OPTIONS",
-                                                 "LSAN_OPTIONS", "LLVM_PROFILE_FILE"};
+/* What sanitizer and coverage builds need to be told, and which BLAS kernels the operator chose:
+ * the command line heeds that too, and a side has the same bits from both. */
+static const char *const passed_environment[] = {
+    "ASAN_OPTIONS",      "UBSAN_OPTIONS",     "TSAN_OPTIONS",    "LSAN_OPTIONS",
+    "LLVM_PROFILE_FILE", "OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE"};
 enum {
     FIXED = sizeof fixed_environment / sizeof fixed_environment[0],
     PASSED = sizeof passed_environment / sizeof passed_environment[0]

@@ -33,11 +33,16 @@ static const double relag_share = 0.1;
 static const double exact_reduction = 0.7;
 static const int exact_damp_after = 2;
 static const double exact_damping = 0.6;
-static const int exact_idle_max = 6;
+/* A step along a tangent that had to be made convex and led nowhere counts as two. */
+static const int exact_idle_max = 4;
 static const int exact_rest = 2; /* more after each relapse */
 /* A direction that moves a node further than this, over the tissue's height, comes from a tangent
  * that is nearly singular: descend instead. */
 static const double exact_move_max = 0.1;
+/* Below this residual a step with the factor of the step before is tried: a fifth of the work. It
+ * must reduce the residual by the second to be followed by another. */
+static const double stale_residual = 1e-3;
+static const double stale_reduction = 0.3;
 /* Convexities tried in turn until the tangent is positive definite. */
 static const double convexity_ladder[] = {0, 0.3, 1};
 
@@ -53,17 +58,22 @@ struct newton {
     double (*saved)[3];  /* [node] displacements before an exact step                         */
     double *normal_N;    /* [node] contact forces by the gradient, or by the model            */
     double *saved_N;     /* [node] tracked contact forces before an exact step                */
+    double *saved_MPa;   /* [element] tracked pressures before an exact step                  */
     double *border;      /* [n] d2E / du dd                                                   */
     double *reduced;     /* [2][n] the load, and minus the border, as linear_reduce leaves them */
     double *direction;   /* [n + 1] du, dd                                                    */
     unsigned char *keep; /* [n] 0: a node off the outer skin that touches the seat; held    */
+    unsigned char *kept; /* [n] the same, of the last factor                                */
     double corner;       /* d2E / dd2                                                         */
     double elastic_Nmm;
     double reaction_N; /* of the bone                                                       */
     double residual;   /* with the contact forces of the present iterate                    */
     bool force_controlled;
-    bool convexified; /* the factored tangent is not the exact one */
+    bool convexified; /* the factored tangent is not the exact one                          */
+    bool has_model;   /* the factor is of a step of this minimisation                       */
 };
+
+static size_t pressures(const struct newton *w) { return (size_t)w->body->batch_count * BATCH; }
 
 enum ischia_code newton_create(struct newton **ret, struct body *body, struct assembly *assembly,
                                struct seat *seat, struct ischia_error *err)
@@ -78,12 +88,14 @@ enum ischia_code newton_create(struct newton **ret, struct body *body, struct as
     w->saved = calloc(nodes, sizeof *w->saved);
     w->normal_N = calloc(nodes, sizeof *w->normal_N);
     w->saved_N = calloc(nodes, sizeof *w->saved_N);
+    w->saved_MPa = calloc(pressures(w), sizeof *w->saved_MPa);
     w->border = calloc(n, sizeof *w->border);
     w->reduced = calloc(2 * n, sizeof *w->reduced);
     w->direction = calloc(n + 1, sizeof *w->direction);
     w->keep = calloc(n, sizeof *w->keep);
+    w->kept = calloc(n, sizeof *w->kept);
     if (!w->force || !w->bulk || !w->trial || !w->saved || !w->normal_N || !w->saved_N ||
-        !w->border || !w->reduced || !w->direction || !w->keep) {
+        !w->saved_MPa || !w->border || !w->reduced || !w->direction || !w->keep || !w->kept) {
         newton_destroy(w);
         return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the Newton iteration");
     }
@@ -105,10 +117,12 @@ void newton_destroy(struct newton *w)
     free(w->saved);
     free(w->normal_N);
     free(w->saved_N);
+    free(w->saved_MPa);
     free(w->border);
     free(w->reduced);
     free(w->direction);
     free(w->keep);
+    free(w->kept);
     free(w);
 }
 
@@ -192,17 +206,31 @@ static double dot(int n, const double *a, const double *b)
 }
 
 /* The right-hand sides, of all that is not contact: minus the gradient, and minus the border. */
-static void load_right_hand_sides(struct newton *w)
+static void set_load(struct newton *w)
 {
-    double *load = w->reduced, *border = w->reduced + w->n;
     for (int n = 0; n < w->body->mesh->node_count; n++)
         for (int c = 0; c < 3; c++) {
             const int eq = w->assembly->equation[n][c];
             if (eq < 0) continue;
-            load[eq] = is_condensed(w, eq) ? -w->bulk[n][c] : -w->force[n][c];
-            border[eq] = -w->border[eq];
-            if (!w->keep[eq]) load[eq] = border[eq] = 0;
+            w->reduced[eq] = is_condensed(w, eq) ? -w->bulk[n][c] : -w->force[n][c];
+            if (!w->keep[eq]) w->reduced[eq] = 0;
         }
+}
+
+static void set_border(struct newton *w)
+{
+    for (int i = 0; i < w->n; i++) w->reduced[w->n + i] = w->keep[i] ? -w->border[i] : 0;
+}
+
+/* What the load makes of the condensed model. */
+static void load_model(struct newton *w, const struct newton_control *control)
+{
+    struct contact_model *model = contact_model_of(w->contact);
+    const int first = w->assembly->seat_first;
+    const double *load = w->reduced, *border = w->reduced + w->n;
+    memcpy(model->load, load + first, sizeof *model->load * (size_t)(w->n - first));
+    model->d_load = control->force_N - w->reaction_N + dot(first, border, load);
+    model->force_controlled = w->force_controlled;
 }
 
 /* Factors the tangent and condenses the model to the nodes on the seat; *ret_factored tells
@@ -212,22 +240,30 @@ static enum ischia_code condense(struct newton *w, const struct newton_control *
                                  struct ischia_error *err)
 {
     struct contact_model *model = contact_model_of(w->contact);
-    const int first = w->assembly->seat_first, rows = w->n - first;
+    const int first = w->assembly->seat_first;
+    const double *border = w->reduced + w->n;
     enum linear_outcome outcome;
+    w->has_model = false;
     TRY(linear_factor(w->assembly->linear, w->keep, &outcome, err));
     report->factorisations++;
     *ret_factored = outcome == LINEAR_FACTORED;
     if (!*ret_factored) return ISCHIA_OK;
-    load_right_hand_sides(w);
+    set_load(w);
+    set_border(w);
     TRY(linear_reduce(w->assembly->linear, 2, w->reduced, err));
-    const double *load = w->reduced, *border = w->reduced + w->n;
     linear_condensed(w->assembly->linear, model->stiffness);
-    memcpy(model->load, load + first, sizeof *model->load * (size_t)rows);
-    for (int i = 0; i < rows; i++) model->border[i] = -border[first + i];
+    for (int i = first; i < w->n; i++) model->border[i - first] = -border[i];
     model->corner = w->corner - dot(first, border, border);
-    model->d_load = control->force_N - w->reaction_N + dot(first, border, load);
-    model->force_controlled = w->force_controlled;
+    load_model(w, control);
+    memcpy(w->kept, w->keep, (size_t)w->n);
+    w->has_model = true;
     return ISCHIA_OK;
+}
+
+/* True when the last factor is of an exact tangent with the same equations held. */
+static bool model_fits(const struct newton *w)
+{
+    return w->has_model && !w->convexified && memcmp(w->keep, w->kept, (size_t)w->n) == 0;
 }
 
 /* The direction from its part at the seat, w->direction[first ... n], which contact gave. */
@@ -409,6 +445,21 @@ static enum ischia_code descent_step(struct newton *w, struct equilibrium *state
     return ISCHIA_OK;
 }
 
+/* Moves along w->direction, and carries the contact forces along. False when it leads nowhere. */
+static bool follow_direction(struct newton *w, struct equilibrium *state, double alpha_max,
+                             const struct newton_control *control)
+{
+    double alpha = 0;
+    if (!(largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm) ||
+        !move_uninverted(w, state, alpha_max, control, &alpha))
+        return false;
+    for (int n = 0; n < w->body->mesh->node_count; n++) {
+        double *tracked = &w->seat->normal_N[n];
+        *tracked = fmax(0, *tracked + alpha * (w->normal_N[n] - *tracked));
+    }
+    return true;
+}
+
 /* A tangent that had to be made convex still leads: carried along by it, the pressures and contact
  * forces come right within a few steps, and with them the tangent. */
 static enum ischia_code exact_step(struct newton *w, struct equilibrium *state, double alpha_max,
@@ -416,14 +467,26 @@ static enum ischia_code exact_step(struct newton *w, struct equilibrium *state, 
                                    struct newton_report *report, bool *ret_made,
                                    struct ischia_error *err)
 {
-    double alpha = 0;
     TRY(find_direction(w, state, control, CONTACT_COULOMB, report, ret_made, err));
-    *ret_made = *ret_made && largest_move_mm(w) < exact_move_max * w->body->mesh->tip_z_mm &&
-                move_uninverted(w, state, alpha_max, control, &alpha);
-    for (int n = 0; *ret_made && n < w->body->mesh->node_count; n++) {
-        double *tracked = &w->seat->normal_N[n];
-        *tracked = fmax(0, *tracked + alpha * (w->normal_N[n] - *tracked));
-    }
+    *ret_made = *ret_made && follow_direction(w, state, alpha_max, control);
+    return ISCHIA_OK;
+}
+
+/* The same with the factor of the step before. */
+static enum ischia_code stale_step(struct newton *w, struct equilibrium *state,
+                                   const struct newton_control *control, bool *ret_made,
+                                   struct ischia_error *err)
+{
+    const double(*u)[3] = (const double(*)[3])state->u_mm;
+    double dd;
+    set_load(w);
+    TRY(linear_reduce(w->assembly->linear, 1, w->reduced, err));
+    load_model(w, control);
+    *ret_made = contact_solve(w->contact, w->seat, u, CONTACT_COULOMB,
+                              w->direction + w->assembly->seat_first, &dd, w->normal_N);
+    if (!*ret_made) return ISCHIA_OK;
+    TRY(expand(w, 1, dd, err));
+    *ret_made = follow_direction(w, state, 1, control);
     return ISCHIA_OK;
 }
 
@@ -438,27 +501,44 @@ struct exact_run {
     int rest;        /* steps of descent before the next run                                   */
     double residual; /* the best                                                               */
     int relapses;    /* runs undone                                                            */
-    double d_mm;     /* at the best; displacements and contact forces are in saved and saved_N */
+    double d_mm;     /* at the best; what else belongs to it is in saved, saved_N, saved_MPa    */
+    bool stale;      /* the last step was made with the factor of one before                   */
+    double previous; /* the residual before the last step                                      */
 };
 
 static void run_save(struct newton *w, const struct equilibrium *state, struct exact_run *run)
 {
     memcpy(w->saved, state->u_mm, 3 * node_bytes(w));
     memcpy(w->saved_N, w->seat->normal_N, node_bytes(w));
+    memcpy(w->saved_MPa, w->body->pressure_MPa, sizeof *w->saved_MPa * pressures(w));
     run->residual = w->residual;
     run->d_mm = state->d_mm;
     run->idle = 0;
 }
 
-static void run_undo(struct newton *w, struct equilibrium *state, struct exact_run *run,
-                     const struct newton_control *control)
+static void run_restore(struct newton *w, struct equilibrium *state, const struct exact_run *run)
 {
     memcpy(state->u_mm, w->saved, 3 * node_bytes(w));
     memcpy(w->seat->normal_N, w->saved_N, node_bytes(w));
     state->d_mm = run->d_mm;
+}
+
+static void run_undo(struct newton *w, struct equilibrium *state, struct exact_run *run,
+                     const struct newton_control *control)
+{
+    run_restore(w, state, run);
     const int relapses = run->relapses + 1;
     *run = (struct exact_run){.rest = exact_rest * relapses, .relapses = relapses};
     body_reset_pressure(w->body, (const double(*)[3])state->u_mm);
+    linearise(w, (const double(*)[3])state->u_mm, 0, control);
+}
+
+/* Back to the best state, from which a stale step has led nowhere; the run goes on. */
+static void run_take_back(struct newton *w, struct equilibrium *state, const struct exact_run *run,
+                          const struct newton_control *control)
+{
+    run_restore(w, state, run);
+    memcpy(w->body->pressure_MPa, w->saved_MPa, sizeof *w->saved_MPa * pressures(w));
     linearise(w, (const double(*)[3])state->u_mm, 0, control);
 }
 
@@ -471,18 +551,32 @@ static void run_update(struct newton *w, struct equilibrium *state, struct exact
         if (run->active) run_save(w, state, run);
     } else if (w->residual < exact_reduction * run->residual) {
         run_save(w, state, run);
-    } else if (++run->idle > exact_idle_max) {
+    } else if (run->stale) {
+        run_take_back(w, state, run, control);
+    } else if ((run->idle += 1 + w->convexified) > exact_idle_max) {
         run_undo(w, state, run, control);
     }
+}
+
+/* A stale step may follow a fresh one close to the end, and another one for as long as they pay. */
+static bool stale_pays(const struct newton *w, const struct exact_run *run)
+{
+    const double most = run->stale ? stale_reduction * run->previous : stale_residual;
+    return run->active && run->idle == 0 && w->residual < most && model_fits(w);
 }
 
 static enum ischia_code one_step(struct newton *w, struct equilibrium *state,
                                  const struct newton_control *control, struct exact_run *run,
                                  struct newton_report *report, struct ischia_error *err)
 {
+    bool made = false;
+    run->stale = stale_pays(w, run);
+    run->previous = w->residual;
+    if (run->stale) TRY(stale_step(w, state, control, &made, err));
+    if (made) return ISCHIA_OK;
+    run->stale = false;
     if (run->active) {
         const double alpha_max = run->idle >= exact_damp_after ? exact_damping : 1;
-        bool made;
         TRY(exact_step(w, state, alpha_max, control, report, &made, err));
         if (made) return ISCHIA_OK;
         run_undo(w, state, run, control);
@@ -498,6 +592,7 @@ enum ischia_code newton_minimise(struct newton *w, struct equilibrium *state,
     struct newton_report report = {.reason = ISCHIA_NOT_STARTED};
     struct exact_run run = {0};
     w->force_controlled = control->force_controlled;
+    w->has_model = false;
     while (report.reason == ISCHIA_NOT_STARTED) {
         linearise(w, (const double(*)[3])state->u_mm, 0, control);
         run_update(w, state, &run, control);
@@ -523,17 +618,23 @@ void newton_linearise(struct newton *w, const struct equilibrium *state)
     const double(*u)[3] = (const double(*)[3])state->u_mm;
     body_reset_pressure(w->body, u);
     linearise(w, u, 0, &any_scale);
+    w->has_model = false;
 }
 
-/* The rate of the condensed model with d: its load is what the border brings. */
+/* The rate of the condensed model with d: its load is what the border brings. The model of the
+ * last step will do, when it was exact: its state is a converged step's last correction away. */
 static enum ischia_code condense_rate(struct newton *w, bool *ret_factored,
                                       struct ischia_error *err)
 {
     const struct newton_control any = {.force_N = 1};
     struct newton_report report = {0};
     struct contact_model *model = contact_model_of(w->contact);
-    w->force_controlled = false;
-    TRY(condense(w, &any, &report, ret_factored, err));
+    *ret_factored = model_fits(w);
+    w->force_controlled = model->force_controlled = false;
+    if (!*ret_factored) {
+        w->convexified = false;
+        TRY(condense(w, &any, &report, ret_factored, err));
+    }
     for (int i = 0; *ret_factored && i < w->n - w->assembly->seat_first; i++)
         model->load[i] = -model->border[i];
     return ISCHIA_OK;

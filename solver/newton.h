@@ -63,7 +63,11 @@ struct newton_tangent {       /* of the equilibrium with respect to d           
     double *normal_rate_N_mm; /* [node] change of the contact forces; the caller's array     */
 };
 
-/* Factors the tangent of the state that the last minimisation or linearisation left. */
+/*
+ * The tangent of the state that the last minimisation or linearisation left. After a minimisation
+ * it is taken from the factor of its last exact step, which is that step's own length away: the
+ * error is of the order of the step. Else the tangent is factored anew.
+ */
 ISCHIA_MUST_CHECK enum ischia_code
 newton_tangent(struct newton *newton, const struct equilibrium *state, struct newton_tangent *ret,
                struct ischia_error *err);

@@ -22,6 +22,11 @@ static const double snap_step = 0.005;
  * the work only, each a thousandth of it. */
 static const double path_tolerance = 1e-3;
 static const double final_tolerance = 1e-8;
+/* While there is hardly any force or work yet, errors are compared with these shares of the final
+ * force, and of that times the height; but never with more than so many times what there is. */
+static const double small_force = 0.1;
+static const double small_work = 0.01;
+static const double small_most = 20;
 /* A step that loses a larger share of the work than this, though it converged, has left the branch
  * of equilibria that the path is on: it is undone and halved. */
 static const double lost_share_max = 1e-3;
@@ -31,8 +36,9 @@ enum {
     PATH_ITERATIONS_MAX = 30,
     SNAP_ITERATIONS_MAX = 300,
     FINAL_ITERATIONS_MAX = 60,
-    LOAD_STEPS_MAX = 100,
-    TRIES_MAX = 200
+    PATH_WORK_MAX = 1500, /* factorisations: a path that takes more than this gets lost */
+    LOAD_STEPS_MAX = 150,
+    TRIES_MAX = 300
 };
 
 /* A converged step. */
@@ -61,6 +67,7 @@ struct path {
     struct newton_tangent ahead;   /* the tangent of a step that is being weighed */
     double height_mm;
     double target_N;
+    double pace;
     int nodes;
 };
 
@@ -137,6 +144,12 @@ static void restore(struct path *p)
     newton_linearise(p->newton, p->state);
 }
 
+/* What an error is compared with where there is `now`, and `small` of the final. */
+static double error_scale(double now, double small)
+{
+    return fmax(now, fmin(small, small_most * now));
+}
+
 /* Work of the step from the last point to `now`. */
 static double work_of_step(const struct path_point *last, const struct path_point *now)
 {
@@ -169,8 +182,9 @@ static double lost_Nmm(const struct path_point *last, const struct path_point *n
 /* The first step has no work to compare with yet, and a real snap loses energy at any length. */
 static bool stays_on_branch(const struct path *p, const struct path_point *now)
 {
+    const double scale_Nmm = error_scale(now->work_Nmm, small_work * p->target_N * p->height_mm);
     return p->report->load_steps == 0 || now->d_mm - p->last.d_mm <= snap_step * p->height_mm ||
-           fabs(lost_Nmm(&p->last, now)) <= lost_share_max * now->work_Nmm;
+           fabs(lost_Nmm(&p->last, now)) <= lost_share_max * scale_Nmm;
 }
 
 /* Books a converged step. */
@@ -212,7 +226,8 @@ struct step {
 static double step_ceiling_mm(const struct path *p)
 {
     if (p->report->load_steps == 0) return first_step * p->height_mm;
-    return fmin(step_of_height * p->height_mm, step_of_remaining * (p->height_mm - p->last.d_mm));
+    return p->pace *
+           fmin(step_of_height * p->height_mm, step_of_remaining * (p->height_mm - p->last.d_mm));
 }
 
 /* By the tangent; under force control when that would reach the target. */
@@ -230,8 +245,9 @@ static enum ischia_code try_step(struct path *p, const struct step *step,
                                  struct newton_report *ret_report, struct ischia_error *err)
 {
     const bool snapping = step->dd_mm < snap_step * p->height_mm;
+    const double predicted_N = p->last.force_N + fmax(p->last.stiffness_N_mm, 0) * step->dd_mm;
     const struct newton_control on_the_way = {
-        .force_N = p->last.force_N + fmax(p->last.stiffness_N_mm, 0) * step->dd_mm,
+        .force_N = error_scale(predicted_N, small_force * p->target_N),
         .tolerance = path_tolerance,
         .iterations_max = snapping ? SNAP_ITERATIONS_MAX : PATH_ITERATIONS_MAX};
     const struct newton_control final = {.force_controlled = true,
@@ -251,7 +267,9 @@ static enum ischia_code follow(struct path *p, struct ischia_error *err)
 {
     double ceiling_mm = HUGE_VAL;
     TRY(start(p, err));
-    for (int tries = 0; tries < TRIES_MAX && p->report->load_steps < LOAD_STEPS_MAX; tries++) {
+    for (int tries = 0; tries < TRIES_MAX && p->report->load_steps < LOAD_STEPS_MAX &&
+                        p->report->factorisations < PATH_WORK_MAX;
+         tries++) {
         struct newton_report newton;
         struct path_point now;
         const struct step step = next_step(p, ceiling_mm);
@@ -274,7 +292,7 @@ static enum ischia_code follow(struct path *p, struct ischia_error *err)
 }
 
 enum ischia_code path_follow(struct body *body, struct assembly *assembly, struct seat *seat,
-                             double force_N, const struct path_observer *observer,
+                             double force_N, double pace, const struct path_observer *observer,
                              struct equilibrium *state, struct path_report *ret_report,
                              struct ischia_error *err)
 {
@@ -287,6 +305,7 @@ enum ischia_code path_follow(struct body *body, struct assembly *assembly, struc
                      .report = &report,
                      .height_mm = body->mesh->tip_z_mm,
                      .target_N = force_N,
+                     .pace = pace,
                      .nodes = body->mesh->node_count};
     enum ischia_code code = path_init(&p, err);
     if (code == ISCHIA_OK) code = follow(&p, err);

@@ -6,7 +6,9 @@
 
 /*
  * The load path: the bone goes down in steps until the seat carries the whole force; the last step
- * is taken under force control, so that the force is met exactly.
+ * is taken under force control, so that the force is met exactly. pace is the length of the steps
+ * over the usual one, (0, 1]: where the tissue folds, which fold it takes depends on it, and a path
+ * that ends short at one pace may arrive at another.
  */
 
 struct path_report {
@@ -32,7 +34,7 @@ struct path_observer {
  * in the last converged state. */
 ISCHIA_MUST_CHECK enum ischia_code
 path_follow(struct body *body, struct assembly *assembly, struct seat *seat, double force_N,
-            const struct path_observer *observer, struct equilibrium *state,
+            double pace, const struct path_observer *observer, struct equilibrium *state,
             struct path_report *ret_report, struct ischia_error *err);
 
 #endif

@@ -5,8 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Stiffness of the sticking springs by unloaded area: 25 kPa of friction stretch them by 0.1 mm. */
-static const double stick_stiffness_MPa_mm = 0.25;
+/* Stiffness of the sticking springs by unloaded area: 25 kPa of friction stretch them by 0.025 mm.
+ */
+static const double stick_stiffness_MPa_mm = 1;
 
 /* A node this near the seat lies on it: it was put there by a sum that rounded. */
 static const double touch_mm = 1e-12;

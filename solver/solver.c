@@ -19,8 +19,8 @@
  * scattering inside the elements at the bonded rim, and what resists the collapse of the elements'
  * corners (element.h). Their effect on eps_max: docs/VERIFICATION.md.
  */
-static const double kappa_point_over_mu = 0.3;
-static const double kappa_corner_over_mu = 0.1;
+static const double kappa_point_over_mu = 1;
+static const double kappa_corner_over_mu = 0.5;
 
 /* What a result must pass to be called converged. */
 static const double energy_residual_max = 5e-3;
@@ -30,6 +30,13 @@ static const double energy_residual_max = 5e-3;
 static const double error_allowance = 0.005;
 /* Of the extrapolation's own correction, how much may be wrong. */
 static const double correction_doubt = 0.25;
+
+/* Lengths of the load path's steps, over the usual: each is tried when the one before has not
+ * arrived. */
+static const double paces[] = {1, 0.7, 0.5};
+static const char *const paces_tried = "the load path in steps of the usual length, and of 0.7 and "
+                                       "0.5 of it";
+enum { PACE_COUNT = sizeof paces / sizeof paces[0] };
 
 /* Coarsest first. */
 enum { LEVEL_COMPANION, LEVEL_MAIN, LEVEL_COUNT };
@@ -86,6 +93,11 @@ struct solve {
     struct ischia_result result;
     double fraction; /* of the progress last reported         */
 };
+
+static bool is_sound(const struct path_report *report)
+{
+    return report->reason > 0 && fabs(report->energy_residual) <= energy_residual_max;
+}
 
 static void solve_finish(struct solve *s)
 {
@@ -279,11 +291,6 @@ static enum ischia_code measure(struct solve *s, struct ischia_error *err)
     return seat_pressure(&level->mesh, &seat, &r->seat, err);
 }
 
-static bool is_sound(const struct path_report *report)
-{
-    return report->reason > 0 && fabs(report->energy_residual) <= energy_residual_max;
-}
-
 /* The checks that a converged load path must still pass. */
 static void judge(struct solve *s)
 {
@@ -330,6 +337,25 @@ static enum ischia_code keep_field(const struct level *level, struct ischia_fiel
     return ISCHIA_OK;
 }
 
+/* Back to rest. */
+static enum ischia_code level_rest(struct solve *s, struct level *level, struct ischia_error *err)
+{
+    struct equilibrium *state = &level->state;
+    memset(state->u_mm, 0, sizeof *state->u_mm * (size_t)level->mesh.node_count);
+    *state = (struct equilibrium){.u_mm = state->u_mm};
+    body_reset_pressure(&level->body, (const double(*)[3])state->u_mm);
+    level->curve.count = 0;
+    seat_finish(&level->seat);
+    return seat_init(&level->seat, &level->mesh, s->c->option[ISCHIA_FRICTION], err);
+}
+
+/* The work of all paths counts; all else is the last one's. */
+static void add_work(const struct path_report *before, struct path_report *report)
+{
+    report->newton_iterations += before->newton_iterations;
+    report->factorisations += before->factorisations;
+}
+
 static enum ischia_code solve_level(struct solve *s, int l, struct ischia_solver *solver,
                                     struct ischia_error *err)
 {
@@ -338,9 +364,16 @@ static enum ischia_code solve_level(struct solve *s, int l, struct ischia_solver
     if (level_divisions[l][s->c->resolution].across == 0) return ISCHIA_OK;
     s->current = l;
     TRY(level_init(s, l, solver, err));
-    return path_follow(&level->body, level->assembly, &level->seat,
-                       quarter_force_N(s->c->param[ISCHIA_F]), &observer, &level->state,
-                       &level->report, err);
+    for (int k = 0; k < PACE_COUNT && !is_sound(&level->report); k++) {
+        const struct path_report before = level->report;
+        if (k > 0) TRY(level_rest(s, level, err));
+        TRY(path_follow(&level->body, level->assembly, &level->seat,
+                        quarter_force_N(s->c->param[ISCHIA_F]), paces[k], &observer, &level->state,
+                        &level->report, err));
+        add_work(&before, &level->report);
+    }
+    if (!is_sound(&level->report)) level->report.tried = paces_tried;
+    return ISCHIA_OK;
 }
 
 static enum ischia_code solve_run(struct solve *s, struct ischia_solver *solver,

@@ -178,6 +178,51 @@ static void tangent_is_the_derivative_of_equilibria(void **state)
     bench_finish(&b);
 }
 
+/* After a minimisation the tangent costs no factorisation and is that of its last step. */
+static void tangent_of_the_last_step_is_near(void **state)
+{
+    (void)state;
+    struct bench b;
+    struct ischia_error err;
+    bench_make(&b, 0.3);
+    const size_t nodes = (size_t)b.mesh.node_count;
+    double(*last)[3] = calloc(nodes, sizeof *last), (*anew)[3] = calloc(nodes, sizeof *anew);
+    double *rate = calloc(nodes, sizeof *rate);
+    assert_true(last && anew && rate);
+    struct newton_tangent of_last = {.direction = last, .normal_rate_N_mm = rate};
+    struct newton_tangent fresh = {.direction = anew, .normal_rate_N_mm = rate};
+    for (int step = 1; step <= 4; step++) press_to(&b, 0.5 * step);
+    if (newton_tangent(b.newton, &b.state, &of_last, &err) != ISCHIA_OK)
+        fail_msg("%s", err.message);
+    newton_linearise(b.newton, &b.state);
+    if (newton_tangent(b.newton, &b.state, &fresh, &err) != ISCHIA_OK) fail_msg("%s", err.message);
+    assert_true(of_last.stiffness_N_mm > 0);
+    assert_near(of_last.stiffness_N_mm / fresh.stiffness_N_mm, 1, 0.01);
+    assert_true(of_last.stiffness_N_mm != fresh.stiffness_N_mm);
+    for (size_t n = 0; n < nodes; n++)
+        for (int c = 0; c < 3; c++) assert_near(last[n][c], anew[n][c], 0.02);
+    free(last);
+    free(anew);
+    free(rate);
+    bench_finish(&b);
+}
+
+/* The last steps to a tight tolerance are made with the factor of the step before. */
+static void the_end_needs_no_factorisations(void **state)
+{
+    (void)state;
+    const struct newton_control control = {
+        .force_controlled = true, .force_N = 0.4, .tolerance = 1e-11, .iterations_max = 100};
+    struct bench b;
+    bench_make(&b, 0.4);
+    press_to(&b, 1);
+    const struct newton_report report = minimise(&b, &control);
+    assert_int_equal(report.reason, ISCHIA_CONVERGED);
+    assert_in_range(report.factorisations, 1, report.iterations - 1);
+    check_equilibrium(&b, 1e-10);
+    bench_finish(&b);
+}
+
 /* --- the observer ----------------------------------------------------------------------------- */
 
 struct watcher {
@@ -229,6 +274,8 @@ int main(void)
         cmocka_unit_test(a_solved_state_needs_no_iteration),
         cmocka_unit_test(the_iteration_limit_is_a_reason),
         cmocka_unit_test(tangent_is_the_derivative_of_equilibria),
+        cmocka_unit_test(tangent_of_the_last_step_is_near),
+        cmocka_unit_test(the_end_needs_no_factorisations),
         cmocka_unit_test(observer_sees_every_iteration_and_cancels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -60,7 +60,7 @@ static enum ischia_code follow(struct bench *b, double force_N, struct log *log,
                                struct path_report *ret_report, struct ischia_error *err)
 {
     const struct path_observer observer = {on_iteration, on_step, log};
-    return path_follow(&b->body, &b->assembly, &b->seat, force_N, log != NULL ? &observer : NULL,
+    return path_follow(&b->body, &b->assembly, &b->seat, force_N, 1, log != NULL ? &observer : NULL,
                        &b->state, ret_report, err);
 }
 
@@ -101,6 +101,25 @@ static void watching_changes_nothing(void **state)
     assert_memory_equal(a.state.u_mm, b.state.u_mm,
                         (size_t)a.mesh.node_count * sizeof *a.state.u_mm);
     assert_true(seen.energy_residual == unseen.energy_residual);
+    bench_finish(&a);
+    bench_finish(&b);
+}
+
+/* Half the pace: more steps to the same end. */
+static void a_slower_pace_takes_more_steps(void **state)
+{
+    (void)state;
+    struct bench a, b;
+    struct path_report usual, slow;
+    bench_make(&a);
+    bench_make(&b);
+    assert_int_equal(path_follow(&a.body, &a.assembly, &a.seat, 3, 1, NULL, &a.state, &usual, NULL),
+                     ISCHIA_OK);
+    assert_int_equal(
+        path_follow(&b.body, &b.assembly, &b.seat, 3, 0.5, NULL, &b.state, &slow, NULL), ISCHIA_OK);
+    assert_int_equal(slow.reason, ISCHIA_CONVERGED);
+    assert_true(slow.load_steps > usual.load_steps);
+    assert_near(b.state.d_mm / a.state.d_mm, 1, 1e-3);
     bench_finish(&a);
     bench_finish(&b);
 }
@@ -151,6 +170,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(path_ends_at_the_force),
         cmocka_unit_test(watching_changes_nothing),
+        cmocka_unit_test(a_slower_pace_takes_more_steps),
         cmocka_unit_test(observers_end_the_path),
         cmocka_unit_test(what_cannot_be_reached_has_a_reason),
     };

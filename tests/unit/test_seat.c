@@ -144,7 +144,7 @@ static struct seat seat_of(const struct mesh *mesh)
     return seat;
 }
 
-/* Springs by area: they add up to 0.25 MPa/mm over the seat quads; outer skin starts in contact. */
+/* Springs by area: they add up to 1 MPa/mm over the seat quads; outer skin starts in contact. */
 static void springs_belong_to_areas(void **state)
 {
     (void)state;
@@ -158,7 +158,7 @@ static void springs_belong_to_areas(void **state)
         assert_true((seat.normal_N[n] > 0) == touches);
         assert_true(seat.normal_N[n] < 1e-9);
     }
-    assert_near(sum, 0.25 * 4 * 6, 1e-12);
+    assert_near(sum, 1.0 * 4 * 6, 1e-12);
     const struct box *b = &small;
     const double corner = seat.stick_stiffness_N_mm[box_node(b, 0, 0, 0)];
     assert_near(seat.stick_stiffness_N_mm[box_node(b, 1, 1, 0)], 4 * corner, 1e-13);

@@ -30,9 +30,9 @@ struct variant {
 };
 /* solver.c's constants first, then one varied at a time. */
 static const struct variant variants[] = {
-    {0.3, 0.1, 1, false}, {0.1, 0.1, 1, true},  {1, 0.1, 1, false}, {5, 0.1, 1, false},
-    {0.3, 0.01, 1, true}, {0.3, 0.3, 1, false}, {0.3, 1, 1, false}, {0.3, 0.1, 0.25, false},
-    {0.3, 0.1, 4, true},  {0.3, 0.1, 16, true},
+    {1, 0.5, 1, false}, {0.1, 0.5, 1, true},   {0.3, 0.5, 1, true},
+    {5, 0.5, 1, false}, {1, 0.05, 1, true},    {1, 0.2, 1, true},
+    {1, 2, 1, false},   {1, 0.5, 0.25, false}, {1, 0.5, 4, true},
 };
 
 struct side {
@@ -109,8 +109,8 @@ static enum ischia_code solve_on(const struct mesh_divisions *divisions,
     struct run r = {0};
     enum ischia_code code = run_init(&r, c, divisions, v, err);
     if (code == ISCHIA_OK)
-        code = path_follow(&r.body, &r.assembly, &r.seat, quarter_force_N(c->param[ISCHIA_F]), NULL,
-                           &r.state, &ret->path, err);
+        code = path_follow(&r.body, &r.assembly, &r.seat, quarter_force_N(c->param[ISCHIA_F]), 1,
+                           NULL, &r.state, &ret->path, err);
     if (code == ISCHIA_OK) measure(&r, ret);
     run_finish(&r);
     return code;

@@ -44,7 +44,7 @@ static struct path_report follow(struct bench *b, double force_N)
 {
     struct path_report report;
     struct ischia_error err;
-    must(path_follow(&b->body, &b->assembly, &b->seat, force_N, NULL, &b->state, &report, &err),
+    must(path_follow(&b->body, &b->assembly, &b->seat, force_N, 1, NULL, &b->state, &report, &err),
          &err);
     return report;
 }
