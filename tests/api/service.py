@@ -38,6 +38,10 @@ if ON_SERVER:
 SIDE = {'R1': 7.1, 'R2': 22.8, 'eM': 31, 'eF': 10, 'muM': 8, 'muF': 5, 'F': 258}
 
 
+# Behind a proxy a request without a token gets that of the tests; one that nobody has stays itself.
+NOBODY = {'Authorization': 'Bearer nobody'}
+
+
 def direct_only(reason):
     """For a test of what the daemon does on a connection of its own."""
     return unittest.skipIf(PROXY, f'not through a proxy: {reason}')

@@ -8,7 +8,7 @@ import tempfile
 import unittest
 
 from emulator_file import BOX, eps_max, write_emulator
-from service import JSON, PATIENCE_S, Service, admin, command_line, side
+from service import JSON, NOBODY, PATIENCE_S, Service, admin, command_line, side
 
 INSIDE = side(R1=7, R2=40, eM=29, eF=22, muM=4, muF=5, F=300)
 
@@ -189,7 +189,8 @@ class Installing(unittest.TestCase):
             token = {'Authorization': 'Bearer ' + next(w for w in words if len(w) > 40)}
             with Service(state=state) as service:
                 self.assertEqual(service.ask('POST', '/v1/estimates', INSIDE, token).status, 403)
-                self.assertEqual(service.ask('POST', '/v1/estimates', INSIDE).status, 401)
+                self.assertEqual(service.ask('POST', '/v1/estimates', INSIDE, NOBODY).status,
+                                 401)
 
 
 if __name__ == '__main__':

@@ -7,7 +7,7 @@ import io
 import tempfile
 import unittest
 
-from service import JSON, SIDE, Service, admin, eventually, side
+from service import JSON, NOBODY, SIDE, Service, admin, eventually, side
 
 CSV = {'Content-Type': 'text/csv'}
 HANGS = 599
@@ -220,13 +220,14 @@ class Access(unittest.TestCase):
                 tokens[scope] = {'Authorization': f'Bearer {token}'}
             with Service(state=state) as service:
                 service.until_ready(**tokens['read'])
-                self.assertEqual(service.ask('POST', '/v1/studies', design(1)).status, 401)
+                self.assertEqual(service.ask('POST', '/v1/studies', design(1), NOBODY).status,
+                                 401)
                 denied = service.ask('POST', '/v1/studies', design(1), tokens['read'])
                 self.assertEqual(denied.status, 403)
                 made = service.ask('POST', '/v1/studies', design(1), tokens['read,assess'])
                 study = made.headers['Location']
                 for path in ('/v1/studies', study, study + '/results'):
-                    self.assertEqual(service.ask('GET', path).status, 401)
+                    self.assertEqual(service.ask('GET', path, None, NOBODY).status, 401)
                     self.assertEqual(service.ask('GET', path, None, tokens['read']).status, 200)
                 cancel = study + '/cancel'
                 self.assertEqual(service.ask('POST', cancel, None, tokens['read']).status, 403)
