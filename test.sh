@@ -108,6 +108,7 @@ if [[ $all == yes && ${#wanted[@]} -eq 0 ]]; then
   run_suites build/threads threads --suite threads --no-suite slow
   build build/valgrind gcc --buildtype=debugoptimized # valgrind 3.19 cannot read clang's DWARF 5
   run_suites build/valgrind unit --setup valgrind --suite unit --no-suite slow
+  run_suites build/valgrind bad-input --suite valgrind
 fi
 
 /usr/bin/python3 tests/count.py "${logs[@]}" || status=1

@@ -96,7 +96,7 @@ static const double brick[HEX_NODES][3] = {{0, 0, 0},        {2.1, 0.1, 0}, {2.0
                                            {2.1, 1.7, 1.3},  {0, 1.4, 1.2}};
 
 static const struct element_material brick_material = {
-    .mu_MPa = 0.008, .kappa_MPa = 0.4, .kappa_point_MPa = 0.04, .kappa_corner_MPa = 0.04};
+    .mu_MPa = 0.008, .kappa_MPa = 0.4, .kappa_point_MPa = 0.04, .corner_share = 0.4};
 
 /* Energy, force and exact stiffness at u. */
 static double evaluate(const struct element_reference *ref, const double u[HEX_NODES][3],

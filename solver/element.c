@@ -38,39 +38,70 @@ static void local_gradients(const double xi[3], double ret[3][HEX_NODES])
     }
 }
 
-const int element_edges[HEX_NODES][3] = {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7},
-                                         {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}};
-
-static double corner_volume(const double X[HEX_NODES][3], int c)
+/* The points of the rule: the Gauss points lie in the octants of the corners. */
+static void point_place(int g, double ret_xi[3])
 {
-    double edge[3][3];
-    for (int k = 0; k < 3; k++)
-        for (int i = 0; i < 3; i++) edge[k][i] = X[element_edges[c][k]][i] - X[c][i];
-    return det3(edge);
+    const double shrink = g < HEX_POINTS ? 1 / sqrt(3.0) : 1;
+    for (int k = 0; k < 3; k++) ret_xi[k] = corner[g % HEX_NODES][k] * shrink;
+}
+
+/* Sets the gradients and the weight of point g. */
+static void point_init(struct element_reference *ret, const double X[HEX_NODES][3], int g)
+{
+    double xi[3], local[3][HEX_NODES], jacobian[3][3] = {{0}}, cofactor[3][3];
+    point_place(g, xi);
+    local_gradients(xi, local);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            for (int a = 0; a < HEX_NODES; a++) jacobian[i][k] += X[a][i] * local[k][a];
+    const double det = det3(jacobian);
+    cofactor3(jacobian, cofactor);
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < HEX_NODES; a++)
+            ret->dN[g][i][a] = (cofactor[i][0] * local[0][a] + cofactor[i][1] * local[1][a] +
+                                cofactor[i][2] * local[2][a]) /
+                               det;
+    ret->weight[g] = det;
+}
+
+/* Sum of the weights of the Gauss points, or of the corners. */
+static double weight_of(const struct element_reference *ref, int first)
+{
+    double sum = 0;
+    for (int g = first; g < first + HEX_POINTS; g++) sum += ref->weight[g];
+    return sum;
+}
+
+/* The mean of a gradient over the Gauss points, or over the corners. */
+static double mean_gradient(const struct element_reference *ref, int first, int i, int a)
+{
+    double sum = 0;
+    for (int g = first; g < first + HEX_POINTS; g++) sum += ref->weight[g] * ref->dN[g][i][a];
+    return sum / weight_of(ref, first);
+}
+
+/*
+ * On distorted elements the corners neither weigh what the element does nor have its mean
+ * gradients, which the Gauss points integrate exactly. Both are put right, the gradients by a
+ * constant, so that affine deformations stay exact and a patch of distorted elements stays without
+ * inner forces.
+ */
+static void correct_corners(struct element_reference *ref)
+{
+    const double scale = ref->volume / weight_of(ref, HEX_POINTS);
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < HEX_NODES; a++) {
+            const double shift = mean_gradient(ref, 0, i, a) - mean_gradient(ref, HEX_POINTS, i, a);
+            for (int g = HEX_POINTS; g < HEX_RULE_POINTS; g++) ref->dN[g][i][a] += shift;
+        }
+    for (int g = HEX_POINTS; g < HEX_RULE_POINTS; g++) ref->weight[g] *= scale;
 }
 
 void element_reference_init(struct element_reference *ret, const double X[HEX_NODES][3])
 {
-    ret->volume = 0;
-    memcpy(ret->X_mm, X, sizeof ret->X_mm);
-    for (int c = 0; c < HEX_NODES; c++) ret->corner_volume[c] = corner_volume(X, c);
-    for (int g = 0; g < HEX_POINTS; g++) {
-        double xi[3], local[3][HEX_NODES], jacobian[3][3] = {{0}}, cofactor[3][3];
-        for (int k = 0; k < 3; k++) xi[k] = corner[g][k] / sqrt(3.0);
-        local_gradients(xi, local);
-        for (int i = 0; i < 3; i++)
-            for (int k = 0; k < 3; k++)
-                for (int a = 0; a < HEX_NODES; a++) jacobian[i][k] += X[a][i] * local[k][a];
-        const double det = det3(jacobian);
-        cofactor3(jacobian, cofactor);
-        for (int i = 0; i < 3; i++)
-            for (int a = 0; a < HEX_NODES; a++)
-                ret->dN[g][i][a] = (cofactor[i][0] * local[0][a] + cofactor[i][1] * local[1][a] +
-                                    cofactor[i][2] * local[2][a]) /
-                                   det;
-        ret->weight[g] = det;
-        ret->volume += det;
-    }
+    for (int g = 0; g < HEX_RULE_POINTS; g++) point_init(ret, X, g);
+    ret->volume = weight_of(ret, 0);
+    correct_corners(ret);
 }
 
 /* --- one element: a batch of its copies ------------------------------------------------------- */

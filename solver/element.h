@@ -5,41 +5,40 @@
 /*
  * The 8-node hexahedron with mean dilatation (Q1/P0, the pressure condensed out):
  *
- *   E(u) = sum_g w_g W(F_g) + V (kappa - kappa_s - kappa_c) / 2 (v / V - 1)^2
- *          + sum_g w_g kappa_s / 2 (J_g - 1)^2
- *          + sum_c V_c / 8 kappa_c / 2 (J_c + 1 / J_c - 2)
+ *   E(u) = (1 - c) sum_g w_g W(F_g) + c sum_k V_k / 8 W(F_k) + sum_g w_g kappa_s / 2 (J_g - 1)^2
+ *          + V (kappa - kappa_s) / 2 (v / V - 1)^2
  *
- * with V the unloaded and v the deformed volume, W the isochoric Ogden energy, and V_c the volume
- * of the parallelepiped of the three edges that meet in corner c, J_c what it has become of it. The
- * third term is the point-wise share of the volumetric energy: without it nothing keeps J_g from
- * scattering inside an element. The fourth keeps the corners from collapsing: det F can be positive
- * at all points while an edge shrinks to nothing, and then elements under the bone's tip let it
- * sink through to the seat, and those at the bonded rim snap from fold to fold. Where tissue keeps
- * its volume both vanish. Their effect on eps_max is measured in docs/VERIFICATION.md.
+ * over the 2 x 2 x 2 Gauss points g and the corners k, with V the unloaded and v the deformed
+ * volume, W the isochoric Ogden energy, and V_k the volume of the parallelepiped of the three edges
+ * that meet in corner k. Gauss points alone (c = 0) do not see what happens at the corners: in
+ * strongly sheared tissue neighbouring nodes then zigzag and edges shrink to nothing at hardly any
+ * cost. Any share c is a rule of the same order for W, and one that does see it. kappa_s is a
+ * point-wise share of the volumetric energy; kappa_s = kappa is the element without mean
+ * dilatation. docs/decisions/0018-corners-in-the-quadrature.md.
  */
 
-enum { HEX_NODES = 8, HEX_POINTS = 8, HEX_DOFS = 24 };
+/* Points of the rule for W: the Gauss points first, then the corners, in VTK order both. */
+enum { HEX_NODES = 8, HEX_POINTS = 8, HEX_RULE_POINTS = HEX_POINTS + HEX_NODES, HEX_DOFS = 24 };
 
 struct element_material {
     double mu_MPa;
-    double kappa_MPa;        /* bulk modulus                                  */
-    double kappa_point_MPa;  /* kappa_s above: its share at the points        */
-    double kappa_corner_MPa; /* kappa_c above: resists the collapse of corners */
+    double kappa_MPa;       /* bulk modulus                              */
+    double kappa_point_MPa; /* kappa_s above                             */
+    double corner_share;    /* c above, in [0, 1]: the corners' weight   */
 };
 
 /* Gradients of the shape functions by X, [component][node], and weights det(dX/dxi). */
 struct element_reference {
-    double dN[HEX_POINTS][3][HEX_NODES]; /* 1/mm */
-    double weight[HEX_POINTS];           /* mm3  */
-    double volume;                       /* mm3  */
-    double X_mm[HEX_NODES][3];
-    double corner_volume[HEX_NODES]; /* of the edges that meet there, mm3 */
+    double dN[HEX_RULE_POINTS][3][HEX_NODES]; /* 1/mm                                            */
+    double
+        weight[HEX_RULE_POINTS]; /* mm3; of the Gauss points, and of the corners: V_k / 8        */
+    double volume;               /* mm3; by the Gauss points, which is exact                     */
 };
 
 /* Fills ret from the unloaded corner positions in mm (VTK order). */
 void element_reference_init(struct element_reference *ret, const double X_mm[HEX_NODES][3]);
 
-/* Smallest det F over the points and J_c over the corners of the element under displacements u. */
+/* Smallest det F over the points of the rule, corners included, under displacements u. */
 double element_det_F_min(const struct element_reference *ref, const double u_mm[HEX_NODES][3]);
 
 /* Derivatives of one element's energy. Rows and columns of the stiffness: component * 8 + node. */
@@ -47,7 +46,7 @@ struct element_derivatives {
     double force[3][HEX_NODES];           /* gradient, N                        */
     double stiffness[HEX_DOFS][HEX_DOFS]; /* Hessian, N/mm, both triangles      */
     double volume_gradient[3][HEX_NODES]; /* dv/du, mm2                         */
-    double pressure_MPa;                  /* (kappa - kappa_s - kappa_c) (v / V - 1) */
+    double pressure_MPa;                  /* (kappa - kappa_s) (v / V - 1) */
 };
 
 /*

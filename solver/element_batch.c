@@ -6,21 +6,18 @@
 void element_batch_set(struct element_batch *batch, int lane, const struct element_reference *ref,
                        const struct element_material *material)
 {
-    for (int g = 0; g < HEX_POINTS; g++) {
+    const double share = material->corner_share;
+    for (int g = 0; g < HEX_RULE_POINTS; g++) {
         for (int i = 0; i < 3; i++)
             for (int a = 0; a < HEX_NODES; a++) batch->dN[g][i][a][lane] = ref->dN[g][i][a];
         batch->weight[g][lane] = ref->weight[g];
     }
     batch->volume[lane] = ref->volume;
-    batch->mu_MPa[lane] = material->mu_MPa;
-    batch->kappa_mean_MPa[lane] =
-        material->kappa_MPa - material->kappa_point_MPa - material->kappa_corner_MPa;
-    batch->kappa_point_MPa[lane] = material->kappa_point_MPa;
-    batch->kappa_corner_MPa[lane] = material->kappa_corner_MPa;
-    for (int c = 0; c < HEX_NODES; c++) {
-        for (int i = 0; i < 3; i++) batch->X_mm[c][i][lane] = ref->X_mm[c][i];
-        batch->corner_volume[c][lane] = ref->corner_volume[c];
-    }
+    batch->mu_MPa[POINT_GAUSS][lane] = (1 - share) * material->mu_MPa;
+    batch->mu_MPa[POINT_CORNER][lane] = share * material->mu_MPa;
+    batch->kappa_mean_MPa[lane] = material->kappa_MPa - material->kappa_point_MPa;
+    batch->kappa_point_MPa[POINT_GAUSS][lane] = material->kappa_point_MPa;
+    batch->kappa_point_MPa[POINT_CORNER][lane] = 0;
 }
 
 static bool always(void) { return true; }

@@ -13,28 +13,25 @@
  */
 
 enum { BATCH = 8, HEX_ENTRIES = HEX_DOFS * (HEX_DOFS + 1) / 2 };
+/* The points of the rule by kind: the Gauss points come first. */
+enum point_kind { POINT_GAUSS, POINT_CORNER, POINT_KINDS };
 
 #define BATCH_ALIGNED _Alignas(64)
 
 /* Reference and material of the elements; units as in element.h. */
 struct element_batch {
-    BATCH_ALIGNED double dN[HEX_POINTS][3][HEX_NODES][BATCH];
-    double weight[HEX_POINTS][BATCH];
+    BATCH_ALIGNED double dN[HEX_RULE_POINTS][3][HEX_NODES][BATCH];
+    double weight[HEX_RULE_POINTS][BATCH];
     double volume[BATCH];
-    double mu_MPa[BATCH];
-    double kappa_mean_MPa[BATCH]; /* kappa - kappa_s - kappa_c */
-    double kappa_point_MPa[BATCH];
-    double kappa_corner_MPa[BATCH];
-    double X_mm[HEX_NODES][3][BATCH];
-    double corner_volume[HEX_NODES][BATCH];
+    double kappa_mean_MPa[BATCH]; /* kappa - kappa_s */
+    /* What the point rule takes of the law at a point of either kind. */
+    double mu_MPa[POINT_KINDS][BATCH];          /* its share of mu              */
+    double kappa_point_MPa[POINT_KINDS][BATCH]; /* kappa_s; none at the corners */
 };
 
 struct element_batch_u {
     BATCH_ALIGNED double mm[HEX_NODES][3][BATCH];
 };
-
-/* The nodes at the other ends of the edges that meet in a corner, right-handed. */
-extern const int element_edges[HEX_NODES][3];
 
 /* Puts an element into a lane. */
 void element_batch_set(struct element_batch *batch, int lane, const struct element_reference *ref,
@@ -60,7 +57,7 @@ struct element_batch_tangent {
 
 /*
  * The same arithmetic compiled for one width of vector registers. Energies are in N mm, HUGE_VAL in
- * the lanes where det F <= 0 at a point or a corner; what else *ret holds in those lanes is
+ * the lanes where det F <= 0 at a point of the rule; what else *ret holds in those lanes is
  * undefined.
  */
 struct element_kernel {

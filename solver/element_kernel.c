@@ -19,7 +19,7 @@
 #include "solver/ogden_lanes.h"
 
 struct points {
-    lanes F[HEX_POINTS][3][3], J[HEX_POINTS];
+    lanes F[HEX_RULE_POINTS][3][3], J[HEX_RULE_POINTS];
     lanes det_F_min, volume;
 };
 
@@ -50,51 +50,17 @@ LANES_INLINE void deformation_gradient(const double dN[3][HEX_NODES][BATCH],
         }
 }
 
-/* --- corners ---------------------------------------------------------------------------------- */
-
-/* One corner: its edges e_k, and J_c = e_0 . e_1 x e_2 over what that was unloaded. */
-struct corner {
-    lanes edge[3][3], volume, J;
-};
-
-LANES_INLINE void corner_init(struct corner *ret, const struct element_batch *batch,
-                              const struct element_batch_u *u, int at, int c)
-{
-    for (int k = 0; k < 3; k++)
-        for (int i = 0; i < 3; i++) {
-            const int n = element_edges[c][k];
-            ret->edge[k][i] = lanes_load(batch->X_mm[n][i] + at) + lanes_load(u->mm[n][i] + at) -
-                              (lanes_load(batch->X_mm[c][i] + at) + lanes_load(u->mm[c][i] + at));
-        }
-    ret->volume = lanes_load(batch->corner_volume[c] + at);
-    ret->J = det3(ret->edge) / ret->volume;
-}
-
-/* Weight and modulus of a corner's energy. */
-LANES_INLINE lanes corner_modulus(const struct element_batch *batch, int at, lanes volume)
-{
-    return lanes_load(batch->kappa_corner_MPa + at) * (volume * (0.5 / HEX_NODES));
-}
-
-/* w kappa_c / 2 (J_c + 1 / J_c - 2) */
-LANES_INLINE lanes corner_energy(lanes modulus, lanes J) { return modulus * (J + 1 / J - 2); }
-
 LANES_INLINE void points_init(struct points *p, const struct element_batch *batch,
                               const struct element_batch_u *u, int at)
 {
     p->det_F_min = lanes_all(HUGE_VAL);
     p->volume = lanes_all(0);
-    for (int g = 0; g < HEX_POINTS; g++) {
+    for (int g = 0; g < HEX_RULE_POINTS; g++) {
         deformation_gradient(batch->dN[g], u->mm, at, p->F[g]);
         p->J[g] = det3(p->F[g]);
         p->det_F_min = lanes_min(p->det_F_min, p->J[g]);
-        p->volume += lanes_load(batch->weight[g] + at) * p->J[g];
     }
-    for (int c = 0; c < HEX_NODES; c++) {
-        struct corner corner;
-        corner_init(&corner, batch, u, at, c);
-        p->det_F_min = lanes_min(p->det_F_min, corner.J);
-    }
+    for (int g = 0; g < HEX_POINTS; g++) p->volume += lanes_load(batch->weight[g] + at) * p->J[g];
 }
 
 /* v / V - 1 */
@@ -104,9 +70,9 @@ LANES_INLINE lanes dilatation(const struct points *p, const struct element_batch
 }
 
 /* Eigenvectors of all F^T F. */
-LANES_INLINE void decompose(struct points *p, struct eigen3 ret[HEX_POINTS])
+LANES_INLINE void decompose(struct points *p, struct eigen3 ret[HEX_RULE_POINTS])
 {
-    for (int g = 0; g < HEX_POINTS; g++) {
+    for (int g = 0; g < HEX_RULE_POINTS; g++) {
         lanes diagonal[3], off[3], (*F)[3] = p->F[g];
         for (int k = 0; k < 3; k++) {
             const int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -115,7 +81,7 @@ LANES_INLINE void decompose(struct points *p, struct eigen3 ret[HEX_POINTS])
         }
         eigen3_init(&ret[g], diagonal, off);
     }
-    eigen3_diagonalise(ret, HEX_POINTS);
+    for (int g = 0; g < HEX_RULE_POINTS; g += HEX_POINTS) eigen3_diagonalise(ret + g, HEX_POINTS);
 }
 
 LANES_INLINE void frame_init(struct frame *f, lanes F[3][3], const struct eigen3 *e)
@@ -136,12 +102,24 @@ LANES_INLINE void frame_init(struct frame *f, lanes F[3][3], const struct eigen3
         for (int i = 0; i < 3; i++) f->U[i][k] *= f->law.inverse[k];
 }
 
-/* Energy density, the point's share of the volumetric energy included. */
-LANES_INLINE lanes point_energy(const struct element_batch *batch, int at, const struct frame *f,
-                                lanes J)
+/* The law's numbers at a point of the rule. */
+struct point_law {
+    lanes mu, kappa;
+    lanes pressure_share; /* 1 where the mean dilatation is integrated: at the Gauss points */
+};
+
+LANES_INLINE struct point_law point_law(const struct element_batch *batch, int at, int g)
 {
-    return ogden_energy_lanes(lanes_load(batch->mu_MPa + at), &f->law) +
-           lanes_load(batch->kappa_point_MPa + at) * 0.5 * ((J - 1) * (J - 1));
+    const enum point_kind kind = g < HEX_POINTS ? POINT_GAUSS : POINT_CORNER;
+    return (struct point_law){lanes_load(batch->mu_MPa[kind] + at),
+                              lanes_load(batch->kappa_point_MPa[kind] + at),
+                              lanes_all(kind == POINT_GAUSS)};
+}
+
+/* Energy density, the point's share of the volumetric energy included. */
+LANES_INLINE lanes point_energy(const struct point_law *law, const struct frame *f, lanes J)
+{
+    return ogden_energy_lanes(law->mu, &f->law) + law->kappa * 0.5 * ((J - 1) * (J - 1));
 }
 
 /* The energy of the mean dilatation, added to that of the points; HUGE_VAL where det F <= 0. */
@@ -231,92 +209,16 @@ LANES_INLINE void convexify(struct ogden_tangent *d, double convexity)
     }
 }
 
-/* dJ_c/dx of the corner (0) and of the ends of its edges. */
-LANES_INLINE void corner_gradient(const struct corner *corner, lanes ret[4][3])
-{
-    const lanes(*e)[3] = corner->edge;
-    for (int k = 0; k < 3; k++)
-        for (int i = 0; i < 3; i++) {
-            const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-            const lanes *p = e[(k + 1) % 3], *q = e[(k + 2) % 3];
-            ret[k + 1][i] = (p[i1] * q[i2] - p[i2] * q[i1]) / corner->volume;
-        }
-    for (int i = 0; i < 3; i++) ret[0][i] = -(ret[1][i] + ret[2][i] + ret[3][i]);
-}
-
-/* d2J_c/dx_a dx_b = the matrix of the cross product with ret, for the corner's nodes a > b. */
-LANES_INLINE void corner_hessian(const struct corner *corner, int a, int b, lanes factor,
-                                 lanes ret[3])
-{
-    const int k = a - 1, l = (k + 1) % 3, m = (k + 2) % 3;
-    const lanes(*e)[3] = corner->edge;
-    for (int i = 0; i < 3; i++)
-        ret[i] = b == 0       ? factor * (e[l][i] - e[m][i])
-                 : b - 1 == l ? factor * e[m][i]
-                              : -(factor * e[l][i]);
-}
-
-LANES_INLINE int entry_at(int p, int q) { return p > q ? row_start(p) + q : row_start(q) + p; }
-
-/* Adds U'' g g^T + U' d2J/dx2 for two nodes of a corner. */
-LANES_INLINE void add_corner_block(const struct corner *corner, const lanes g[4][3], lanes second,
-                                   lanes first, int c, int a, int b, int at,
-                                   double stiffness[HEX_ENTRIES][BATCH])
-{
-    static const double sign[3][3] = {{0, 1, -1}, {-1, 0, 1}, {1, -1, 0}};
-    const int node_a = a == 0 ? c : element_edges[c][a - 1];
-    const int node_b = b == 0 ? c : element_edges[c][b - 1];
-    lanes v[3] = {{0}};
-    if (a != b) corner_hessian(corner, a, b, first, v);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < (a == b ? i + 1 : 3); j++) {
-            double *entry =
-                stiffness[entry_at(i * HEX_NODES + node_a, j * HEX_NODES + node_b)] + at;
-            lanes sum = lanes_load(entry) + second * (g[a][i] * g[b][j]);
-            if (i != j) sum += sign[i][j] * v[3 - i - j];
-            lanes_store(entry, sum);
-        }
-}
-
-/* The corners' energy (returned), forces and stiffness. */
-LANES_INLINE lanes add_corners(const struct element_batch *batch, const struct element_batch_u *u,
-                               double convexity, int at, lanes force[3][HEX_NODES],
-                               double stiffness[HEX_ENTRIES][BATCH])
-{
-    lanes energy = lanes_all(0);
-    for (int c = 0; c < HEX_NODES; c++) {
-        struct corner corner;
-        lanes g[4][3];
-        corner_init(&corner, batch, u, at, c);
-        corner_gradient(&corner, g);
-        const lanes modulus = corner_modulus(batch, at, corner.volume), inverse = 1 / corner.J;
-        const lanes first = modulus * (1 - inverse * inverse);
-        const lanes second = 2 * modulus * (inverse * inverse * inverse);
-        energy += corner_energy(modulus, corner.J);
-        for (int i = 0; i < 3; i++) {
-            force[i][c] += first * g[0][i];
-            for (int k = 0; k < 3; k++) force[i][element_edges[c][k]] += first * g[k + 1][i];
-        }
-        for (int a = 0; a < 4; a++)
-            for (int b = 0; b <= a; b++)
-                add_corner_block(&corner, (const lanes(*)[3])g, second,
-                                 first * (1 - convexity) / corner.volume, c, a, b, at, stiffness);
-    }
-    return energy;
-}
-
 /* Derivatives at the tracked pressure, with the volumetric law of the point. */
-LANES_INLINE void point_tangent(const struct element_batch *batch, int at, lanes pressure,
-                                double convexity, const struct ogden_terms *law, lanes J,
-                                struct ogden_tangent *ret)
+LANES_INLINE void point_tangent(const struct point_law *law, lanes pressure, double convexity,
+                                const struct ogden_terms *terms, lanes J, struct ogden_tangent *ret)
 {
-    const lanes kappa = lanes_load(batch->kappa_point_MPa + at);
-    ogden_tangent(lanes_load(batch->mu_MPa + at), pressure + kappa * (J - 1), law, ret);
-    const lanes bulk = kappa * J * J;
+    ogden_tangent(law->mu, law->pressure_share * pressure + law->kappa * (J - 1), terms, ret);
+    const lanes bulk = law->kappa * J * J;
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
-        ret->normal[k] += bulk * (law->inverse[k] * law->inverse[k]);
-        ret->mixed[k] += bulk * (law->inverse[i] * law->inverse[j]);
+        ret->normal[k] += bulk * (terms->inverse[k] * terms->inverse[k]);
+        ret->mixed[k] += bulk * (terms->inverse[i] * terms->inverse[j]);
     }
     if (convexity > 0) convexify(ret, convexity);
 }
@@ -410,33 +312,21 @@ static void kernel_volume(const struct element_batch *batch, const struct elemen
     }
 }
 
-LANES_INLINE lanes corners_energy(const struct element_batch *batch,
-                                  const struct element_batch_u *u, int at)
-{
-    lanes energy = lanes_all(0);
-    for (int c = 0; c < HEX_NODES; c++) {
-        struct corner corner;
-        corner_init(&corner, batch, u, at, c);
-        energy += corner_energy(corner_modulus(batch, at, corner.volume), corner.J);
-    }
-    return energy;
-}
-
 static void kernel_energy(const struct element_batch *batch, const struct element_batch_u *u,
                           double ret_energy[BATCH])
 {
     for (int at = 0; at < BATCH; at += LANES) {
         struct points p;
-        struct eigen3 eigen[HEX_POINTS];
+        struct eigen3 eigen[HEX_RULE_POINTS];
         lanes energy = lanes_all(0);
         points_init(&p, batch, u, at);
         decompose(&p, eigen);
-        for (int g = 0; g < HEX_POINTS; g++) {
+        for (int g = 0; g < HEX_RULE_POINTS; g++) {
+            const struct point_law law = point_law(batch, at, g);
             struct frame f;
             frame_init(&f, p.F[g], &eigen[g]);
-            energy += lanes_load(batch->weight[g] + at) * point_energy(batch, at, &f, p.J[g]);
+            energy += lanes_load(batch->weight[g] + at) * point_energy(&law, &f, p.J[g]);
         }
-        energy += corners_energy(batch, u, at);
         lanes_store(ret_energy + at, whole_energy(batch, at, &p, energy));
     }
 }
@@ -447,7 +337,7 @@ LANES_INLINE void linearise(const struct element_batch *batch, const struct elem
                             struct element_batch_derivatives *ret, double ret_energy[BATCH])
 {
     struct points p;
-    struct eigen3 eigen[HEX_POINTS];
+    struct eigen3 eigen[HEX_RULE_POINTS];
     lanes energy = lanes_all(0), force[3][HEX_NODES] = {{{0}}}, dv[3][HEX_NODES];
     const lanes mean_kappa = lanes_load(batch->kappa_mean_MPa + at);
     points_init(&p, batch, u, at);
@@ -455,24 +345,23 @@ LANES_INLINE void linearise(const struct element_batch *batch, const struct elem
     volume_gradient(batch, at, &p, dv);
     start_stiffness(mean_kappa / lanes_load(batch->volume + at), dv, at, ret->stiffness);
     const lanes pressure = mean_kappa * dilatation(&p, batch, at);
-    const lanes kappa_point = lanes_load(batch->kappa_point_MPa + at);
-    const lanes mu = lanes_load(batch->mu_MPa + at);
-    for (int g = 0; g < HEX_POINTS; g++) {
+    const lanes tracked = lanes_load(tangent->pressure_MPa + at);
+    for (int g = 0; g < HEX_RULE_POINTS; g++) {
+        const struct point_law law = point_law(batch, at, g);
         struct frame f;
         struct ogden_tangent d;
         lanes n[3][HEX_NODES], gradient[3], stress[3][3];
         const lanes weight = lanes_load(batch->weight[g] + at);
         frame_init(&f, p.F[g], &eigen[g]);
         frame_gradients(batch->dN[g], at, f.V, n);
-        energy += weight * point_energy(batch, at, &f, p.J[g]);
-        ogden_gradient(mu, pressure + kappa_point * (p.J[g] - 1), &f.law, gradient);
+        energy += weight * point_energy(&law, &f, p.J[g]);
+        ogden_gradient(law.mu, law.pressure_share * pressure + law.kappa * (p.J[g] - 1), &f.law,
+                       gradient);
         frame_stress(f.U, gradient, weight, stress);
         add_force(stress, n, force);
-        point_tangent(batch, at, lanes_load(tangent->pressure_MPa + at), tangent->convexity, &f.law,
-                      p.J[g], &d);
+        point_tangent(&law, tracked, tangent->convexity, &f.law, p.J[g], &d);
         add_stiffness(&d, f.U, weight, n, at, ret->stiffness);
     }
-    energy += add_corners(batch, u, tangent->convexity, at, force, ret->stiffness);
     store_vector(force, at, ret->force);
     store_vector(dv, at, ret->volume_gradient);
     lanes_store(ret->pressure_MPa + at, pressure);

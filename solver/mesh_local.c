@@ -46,6 +46,10 @@ static const double outer_axis_slope = 0.2;
 static const double radial_bone_slope = 0.4;
 /* Tissue beyond the bone's exit from the box top, at the least. */
 static const double exit_margin_mm = 10;
+/* A box wider than this L/h has the cells of one of this width, but for the outer half of them,
+ * which stretch: what a wider box does is then not mixed with what a coarser mesh under the bone
+ * does. */
+static const double unstretched_L_over_h = 2;
 
 enum { MERIDIAN_SAMPLES = 64, RIM_SAMPLES = 256 };
 
@@ -54,6 +58,7 @@ struct local_geometry {
     double tip_z, top_z;     /* lowest bone point; box top                                      */
     double muscle_z, skin_z; /* muscle/fat and fat/skin interfaces                              */
     double half_width;
+    double stretch;                 /* of it, what is beyond the unstretched width */
     double rim[RIM_SAMPLES + 1][2]; /* outline of the bone in the box top, even in arc length   */
 };
 
@@ -119,13 +124,18 @@ static struct local_geometry geometry_of(const struct ischia_case *c)
     g.muscle_z = skin + c->param[ISCHIA_EF];
     g.tip_z = g.muscle_z + c->param[ISCHIA_EM];
     g.top_z = g.tip_z + g.R1 * c->option[ISCHIA_EMBED_OVER_R1];
-    g.half_width = fmax(c->option[ISCHIA_L_OVER_H] * h / 2, outline_x(&g, 0) + exit_margin_mm);
+    const double least = outline_x(&g, 0) + exit_margin_mm;
+    g.half_width = fmax(c->option[ISCHIA_L_OVER_H] * h / 2, least);
+    g.stretch = fmax(0, g.half_width - fmax(unstretched_L_over_h * h / 2, least));
     rim_build(&g);
     return g;
 }
 
 /* Odd-cubic spacing on [0, 1]: slope `slope` at 0, larger cells further out. */
 static double graded(double t, double slope) { return t * (slope + (1 - slope) * t * (2 - t)); }
+
+/* The share of the stretch that a place at the fraction t has: none in the inner half. */
+static double stretched(double t) { return pow(fmax(0, 2 * t - 1), 3); }
 
 static void lerp3(const double a[3], const double b[3], double t, double ret[3])
 {
@@ -187,15 +197,23 @@ static void bowl_patch_point(const struct local_geometry *g, enum patch patch, d
     bowl_point(g, atan2(p[1], p[0]) / M_PI_2, hypot(p[0], p[1]), ret);
 }
 
-static void outer_patch_point(const struct local_geometry *g, enum patch patch, double a, double b,
-                              double ret[3])
+/* Where the fraction t of an outer face's width is, with the share `stretch` of the stretch. */
+static double outer_place(const struct local_geometry *g, double t, double stretch)
 {
-    const double w = g->half_width, along = w * graded(a, outer_axis_slope);
+    return (g->half_width - g->stretch) * graded(t, outer_axis_slope) +
+           stretch * g->stretch * stretched(t);
+}
+
+/* The end of a line from the bone; with stretch = 0 where it would be in the unstretched box. */
+static void outer_patch_point(const struct local_geometry *g, enum patch patch, double a, double b,
+                              double stretch, double ret[3])
+{
+    const double w = outer_place(g, 1, stretch), along = outer_place(g, a, stretch);
     ret[2] = g->muscle_z + b * (g->top_z - g->muscle_z);
     switch (patch) {
     case PATCH_CORE:
         ret[0] = along;
-        ret[1] = w * graded(b, outer_axis_slope);
+        ret[1] = outer_place(g, b, stretch);
         ret[2] = g->muscle_z;
         break;
     case PATCH_X:
@@ -256,12 +274,16 @@ static void place_muscle_line(struct mesh *m, const struct local_geometry *g, en
 {
     const struct mesh_divisions *d = &m->divisions;
     const double a = (double)i / d->across, b = (double)j / patch_rows(d, patch);
-    double bowl[3], outer[3];
+    double bowl[3], inner[3], outer[3];
     bowl_patch_point(g, patch, a, b, bowl);
-    outer_patch_point(g, patch, a, b, outer);
-    for (int l = 0; l <= d->radial; l++)
-        lerp3(bowl, outer, graded((double)l / d->radial, radial_bone_slope),
-              m->X_mm[muscle_node(d, patch, i, j, l)]);
+    outer_patch_point(g, patch, a, b, 0, inner);
+    outer_patch_point(g, patch, a, b, 1, outer);
+    for (int l = 0; l <= d->radial; l++) {
+        const double t = (double)l / d->radial;
+        double *X = m->X_mm[muscle_node(d, patch, i, j, l)];
+        lerp3(bowl, inner, graded(t, radial_bone_slope), X);
+        for (int k = 0; k < 3; k++) X[k] += stretched(t) * (outer[k] - inner[k]);
+    }
 }
 
 static void place_column(struct mesh *m, const struct local_geometry *g, int i, int j)

@@ -36,7 +36,6 @@ enum {
     PATH_ITERATIONS_MAX = 30,
     SNAP_ITERATIONS_MAX = 300,
     FINAL_ITERATIONS_MAX = 60,
-    PATH_WORK_MAX = 1500, /* factorisations: a path that takes more than this gets lost */
     LOAD_STEPS_MAX = 150,
     TRIES_MAX = 300
 };
@@ -67,7 +66,7 @@ struct path {
     struct newton_tangent ahead;   /* the tangent of a step that is being weighed */
     double height_mm;
     double target_N;
-    double pace;
+    const struct path_effort *effort;
     int nodes;
 };
 
@@ -226,7 +225,7 @@ struct step {
 static double step_ceiling_mm(const struct path *p)
 {
     if (p->report->load_steps == 0) return first_step * p->height_mm;
-    return p->pace *
+    return p->effort->pace *
            fmin(step_of_height * p->height_mm, step_of_remaining * (p->height_mm - p->last.d_mm));
 }
 
@@ -268,7 +267,7 @@ static enum ischia_code follow(struct path *p, struct ischia_error *err)
     double ceiling_mm = HUGE_VAL;
     TRY(start(p, err));
     for (int tries = 0; tries < TRIES_MAX && p->report->load_steps < LOAD_STEPS_MAX &&
-                        p->report->factorisations < PATH_WORK_MAX;
+                        p->report->factorisations < p->effort->factorisations_max;
          tries++) {
         struct newton_report newton;
         struct path_point now;
@@ -292,9 +291,9 @@ static enum ischia_code follow(struct path *p, struct ischia_error *err)
 }
 
 enum ischia_code path_follow(struct body *body, struct assembly *assembly, struct seat *seat,
-                             double force_N, double pace, const struct path_observer *observer,
-                             struct equilibrium *state, struct path_report *ret_report,
-                             struct ischia_error *err)
+                             double force_N, const struct path_effort *effort,
+                             const struct path_observer *observer, struct equilibrium *state,
+                             struct path_report *ret_report, struct ischia_error *err)
 {
     struct path_report report = {.reason = ISCHIA_NOT_STARTED, .tried = ""};
     struct path p = {.body = body,
@@ -305,7 +304,7 @@ enum ischia_code path_follow(struct body *body, struct assembly *assembly, struc
                      .report = &report,
                      .height_mm = body->mesh->tip_z_mm,
                      .target_N = force_N,
-                     .pace = pace,
+                     .effort = effort,
                      .nodes = body->mesh->node_count};
     enum ischia_code code = path_init(&p, err);
     if (code == ISCHIA_OK) code = follow(&p, err);

@@ -6,10 +6,15 @@
 
 /*
  * The load path: the bone goes down in steps until the seat carries the whole force; the last step
- * is taken under force control, so that the force is met exactly. pace is the length of the steps
- * over the usual one, (0, 1]: where the tissue folds, which fold it takes depends on it, and a path
- * that ends short at one pace may arrive at another.
+ * is taken under force control, so that the force is met exactly.
  */
+
+/* Where the tissue folds, which fold it takes depends on the steps: a path that ends short at one
+ * pace may arrive at another. */
+struct path_effort {
+    double pace;            /* length of the steps over the usual one, (0, 1]      */
+    int factorisations_max; /* a path that takes more than these has lost its way  */
+};
 
 struct path_report {
     enum ischia_reason reason;
@@ -34,7 +39,7 @@ struct path_observer {
  * in the last converged state. */
 ISCHIA_MUST_CHECK enum ischia_code
 path_follow(struct body *body, struct assembly *assembly, struct seat *seat, double force_N,
-            double pace, const struct path_observer *observer, struct equilibrium *state,
-            struct path_report *ret_report, struct ischia_error *err);
+            const struct path_effort *effort, const struct path_observer *observer,
+            struct equilibrium *state, struct path_report *ret_report, struct ischia_error *err);
 
 #endif

@@ -7,6 +7,7 @@ import tempfile
 import unittest
 
 PROGRAM = os.environ["ISCHIA"]
+UNDER = os.environ.get("ISCHIA_UNDER", "").split()  # valgrind and its options, say
 GOOD = {"R1": 7.1, "R2": 22.8, "eM": 31, "eF": 10, "muM": 8, "muF": 5, "F": 258}
 HEADER = "R1_mm,R2_mm,eM_mm,eF_mm,muM_kPa,muF_kPa,F_N"
 
@@ -14,7 +15,7 @@ HEADER = "R1_mm,R2_mm,eM_mm,eF_mm,muM_kPa,muF_kPa,F_N"
 def run(*arguments, stdin=b"", timeout=600, **more):
     if isinstance(stdin, str):
         stdin = stdin.encode()
-    return subprocess.run([PROGRAM, *arguments], input=stdin, capture_output=True,
+    return subprocess.run([*UNDER, PROGRAM, *arguments], input=stdin, capture_output=True,
                           timeout=timeout, **more)
 
 

@@ -56,12 +56,15 @@ static enum ischia_code on_step(void *context, const struct equilibrium *state,
     return ISCHIA_OK;
 }
 
+static const struct path_effort usual_effort = {.pace = 1, .factorisations_max = 1000};
+static const struct path_effort slow_effort = {.pace = 0.5, .factorisations_max = 1000};
+
 static enum ischia_code follow(struct bench *b, double force_N, struct log *log,
                                struct path_report *ret_report, struct ischia_error *err)
 {
     const struct path_observer observer = {on_iteration, on_step, log};
-    return path_follow(&b->body, &b->assembly, &b->seat, force_N, 1, log != NULL ? &observer : NULL,
-                       &b->state, ret_report, err);
+    return path_follow(&b->body, &b->assembly, &b->seat, force_N, &usual_effort,
+                       log != NULL ? &observer : NULL, &b->state, ret_report, err);
 }
 
 static void path_ends_at_the_force(void **state)
@@ -113,14 +116,32 @@ static void a_slower_pace_takes_more_steps(void **state)
     struct path_report usual, slow;
     bench_make(&a);
     bench_make(&b);
-    assert_int_equal(path_follow(&a.body, &a.assembly, &a.seat, 3, 1, NULL, &a.state, &usual, NULL),
-                     ISCHIA_OK);
     assert_int_equal(
-        path_follow(&b.body, &b.assembly, &b.seat, 3, 0.5, NULL, &b.state, &slow, NULL), ISCHIA_OK);
+        path_follow(&a.body, &a.assembly, &a.seat, 3, &usual_effort, NULL, &a.state, &usual, NULL),
+        ISCHIA_OK);
+    assert_int_equal(
+        path_follow(&b.body, &b.assembly, &b.seat, 3, &slow_effort, NULL, &b.state, &slow, NULL),
+        ISCHIA_OK);
     assert_int_equal(slow.reason, ISCHIA_CONVERGED);
     assert_true(slow.load_steps > usual.load_steps);
     assert_near(b.state.d_mm / a.state.d_mm, 1, 1e-3);
     bench_finish(&a);
+    bench_finish(&b);
+}
+
+/* A path that takes more factorisations than it may ends short, and says so. */
+static void a_path_ends_at_its_limit_of_work(void **state)
+{
+    (void)state;
+    const struct path_effort little = {.pace = 1, .factorisations_max = 6};
+    struct bench b;
+    struct path_report report;
+    bench_make(&b);
+    assert_int_equal(
+        path_follow(&b.body, &b.assembly, &b.seat, 3, &little, NULL, &b.state, &report, NULL),
+        ISCHIA_OK);
+    assert_true(report.reason < 0);
+    assert_true(report.factorisations >= 6 && report.last_force_N > 0 && report.last_force_N < 3);
     bench_finish(&b);
 }
 
@@ -171,6 +192,7 @@ int main(void)
         cmocka_unit_test(path_ends_at_the_force),
         cmocka_unit_test(watching_changes_nothing),
         cmocka_unit_test(a_slower_pace_takes_more_steps),
+        cmocka_unit_test(a_path_ends_at_its_limit_of_work),
         cmocka_unit_test(observers_end_the_path),
         cmocka_unit_test(what_cannot_be_reached_has_a_reason),
     };

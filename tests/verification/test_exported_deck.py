@@ -29,8 +29,9 @@ ISCHIA, RESOLUTION = None, None
 CASE = {"R1": 6.9, "R2": 19.7, "eM": 28, "eF": 10, "muM": 8, "muF": 5, "F": 40,
         "model": {"bulk_ratio": 15}}
 # Displacement, largest and root mean square, over the seat's travel; strain, root mean square over
-# that of the strain itself.
-TOLERANCES = {"coarse": (0.07, 0.03, 0.15), "standard": (0.03, 0.015, 0.08)}
+# that of the strain itself. The largest displacement is a node's beside the bonded rim of the bone,
+# where the strain is singular: it says less than the mean, and hardly falls with the mesh.
+TOLERANCES = {"coarse": (0.07, 0.03, 0.15), "standard": (0.05, 0.015, 0.08)}
 LETTER = {"Float64": "d", "Int32": "i", "UInt8": "B"}
 
 

@@ -42,9 +42,11 @@ static void block(struct bench *b, double bulk_ratio, unsigned top_flags, double
 
 static struct path_report follow(struct bench *b, double force_N)
 {
+    const struct path_effort effort = {.pace = 1, .factorisations_max = 1500};
     struct path_report report;
     struct ischia_error err;
-    must(path_follow(&b->body, &b->assembly, &b->seat, force_N, 1, NULL, &b->state, &report, &err),
+    must(path_follow(&b->body, &b->assembly, &b->seat, force_N, &effort, NULL, &b->state, &report,
+                     &err),
          &err);
     return report;
 }
