@@ -84,7 +84,7 @@ struct ischia_numerics {
     double last_converged_F_N;
     double wall_s; /* filled in by the program: the solver has no clock               */
     double cpu_s;
-    char detail[160]; /* when not converged: what was tried, in plain words              */
+    char detail[160]; /* what was tried, when not converged; else the rule of a later attempt   */
 };
 
 struct ischia_result {

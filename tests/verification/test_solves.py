@@ -83,6 +83,14 @@ class Quick(unittest.TestCase):
         self.assertEqual(runs[0], runs[1])
         self.assertEqual(runs[0], runs[2])
 
+    def test_a_later_attempt_says_so(self):
+        """A corner of Table 1 whose path does not arrive with the usual rule, on the coarse mesh."""
+        side = dict(zip(KEYS, (5, 63, 39, 35, 1, 8, 428)))
+        numerics = solve(side, resolution="coarse")["numerics"]
+        self.assertTrue(numerics["converged"])
+        self.assertRegex(numerics["detail"], r"^solved with the corners .* weighing [0-9.]+, not 0.4$")
+        self.assertIsNone(solve(table2()["1R"], resolution="coarse")["numerics"]["detail"])
+
     def test_strain_and_travel_grow_with_the_force(self):
         results = [solve({**table2()["1R"], "F": F}) for F in (50, 100, 196)]
         for key, part in (("eps_max", "strain"), ("displacement_mm", "seat")):
