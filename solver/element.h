@@ -10,7 +10,8 @@
  *
  * over the 2 x 2 x 2 Gauss points g and the corners k, with V the unloaded and v the deformed
  * volume, W the isochoric Ogden energy, and V_k the volume of the parallelepiped of the three edges
- * that meet in corner k. Gauss points alone (c = 0) do not see what happens at the corners: in
+ * that meet in corner k (weights and gradients of corners are corrected on distorted elements,
+ * element.c). Gauss points alone (c = 0) do not see what happens at the corners: in
  * strongly sheared tissue neighbouring nodes then zigzag and edges shrink to nothing at hardly any
  * cost. Any share c is a rule of the same order for W, and one that does see it. kappa_s is a
  * point-wise share of the volumetric energy; kappa_s = kappa is the element without mean

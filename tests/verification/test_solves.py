@@ -84,11 +84,15 @@ class Quick(unittest.TestCase):
         self.assertEqual(runs[0], runs[2])
 
     def test_a_later_attempt_says_so(self):
-        """A corner of Table 1 whose path does not arrive with the usual rule, on the coarse mesh."""
-        side = dict(zip(KEYS, (5, 63, 39, 35, 1, 8, 428)))
-        numerics = solve(side, resolution="coarse")["numerics"]
-        self.assertTrue(numerics["converged"])
-        self.assertRegex(numerics["detail"], r"^solved with the corners .* weighing [0-9.]+, not 0.4$")
+        """Corners of Table 1 whose paths do not arrive with the usual rule, on the coarse mesh. Which
+        fold a path takes may depend on how the BLAS rounds: one of them is enough."""
+        corners = ((5, 63, 39, 35, 1, 8, 428), (5, 15, 19, 9, 1, 8, 428))
+        found = [solve(dict(zip(KEYS, c)), resolution="coarse")["numerics"] for c in corners]
+        self.assertTrue(all(numerics["converged"] for numerics in found))
+        said = [numerics["detail"] for numerics in found if numerics["detail"] is not None]
+        self.assertGreater(len(said), 0)
+        for detail in said:
+            self.assertRegex(detail, r"^solved with the corners .* weighing [0-9.]+, not 0.4$")
         self.assertIsNone(solve(table2()["1R"], resolution="coarse")["numerics"]["detail"])
 
     def test_strain_and_travel_grow_with_the_force(self):
