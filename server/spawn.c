@@ -15,18 +15,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "server/blas_environment.h"
+
 enum { WORKER_FD = 3, EXIT_NOT_EXECUTABLE = 127, EXIT_NOT_SET_UP = 126 };
 
-/* Threads of BLAS would fight over the cores that other workers have. CHOLMOD asks OpenMP for four
- * by number, whatever OMP_NUM_THREADS says: only the limit stops that. */
-static const char *const fixed_environment[] = {"PATH=/usr/bin:/bin", "LANG=C.UTF-8",
-                                                "OPENBLAS_NUM_THREADS=1", "OMP_NUM_THREADS=1",
-                                                "OMP_THREAD_LIMIT=1"};
-/* What sanitizer and coverage builds need to be told, and which BLAS kernels the operator chose:
- * the command line heeds that too, and a side has the same bits from both. */
-static const char *const passed_environment[] = {
-    "ASAN_OPTIONS",      "UBSAN_OPTIONS",     "TSAN_OPTIONS",    "LSAN_OPTIONS",
-    "LLVM_PROFILE_FILE", "OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE"};
+static const char *const fixed_environment[] = {"PATH=/usr/bin:/bin", "LANG=C.UTF-8"};
+/* What sanitizer and coverage builds need to be told, and what else OpenBLAS heeds: the command
+ * line does so too, and a side has the same bits from both. */
+static const char *const passed_environment[] = {"ASAN_OPTIONS",      "UBSAN_OPTIONS",
+                                                 "TSAN_OPTIONS",      "LSAN_OPTIONS",
+                                                 "LLVM_PROFILE_FILE", "OPENBLAS_L2_SIZE"};
 enum {
     FIXED = sizeof fixed_environment / sizeof fixed_environment[0],
     PASSED = sizeof passed_environment / sizeof passed_environment[0]
@@ -36,8 +34,9 @@ enum {
  * calls that are safe in a signal handler are allowed. */
 struct plan {
     char *argument[SPAWN_COMMAND_MAX + 1];
-    char *environment[FIXED + PASSED + 1];
-    char *passed[PASSED]; /* "NAME=value", malloc'ed */
+    char *environment[FIXED + PASSED + BLAS_SETTINGS_MAX + 1];
+    char *passed[PASSED + BLAS_SETTINGS_MAX]; /* "NAME=value", malloc'ed */
+    size_t passed_count;
     size_t memory_max_bytes;
     int socket; /* the child's end */
     pid_t parent;
@@ -60,26 +59,36 @@ static enum ischia_code plan_arguments(struct plan *plan, const char *const *com
     return ISCHIA_OK;
 }
 
+static enum ischia_code pass_on(struct plan *plan, const char *name, const char *value,
+                                struct ischia_error *err)
+{
+    char *pair;
+    const int length = asprintf(&pair, "%s=%s", name, value);
+    CHECK(length >= 0, err, ISCHIA_E_MEMORY, "no memory for a worker's environment");
+    plan->passed[plan->passed_count++] = pair;
+    return ISCHIA_OK;
+}
+
 static enum ischia_code plan_environment(struct plan *plan, struct ischia_error *err)
 {
     size_t count = 0;
     for (int i = 0; i < FIXED; i++)
         plan->environment[count++] = (char *)(uintptr_t)fixed_environment[i];
+    struct blas_setting blas[BLAS_SETTINGS_MAX];
+    const size_t blas_count = blas_environment(blas);
+    for (size_t i = 0; i < blas_count; i++) TRY(pass_on(plan, blas[i].name, blas[i].value, err));
     for (int i = 0; i < PASSED; i++) {
         const char *value = getenv(passed_environment[i]);
-        if (value == NULL) continue;
-        const int length = asprintf(&plan->passed[i], "%s=%s", passed_environment[i], value);
-        if (length < 0) plan->passed[i] = NULL;
-        CHECK(length >= 0, err, ISCHIA_E_MEMORY, "no memory for a worker's environment");
-        plan->environment[count++] = plan->passed[i];
+        if (value != NULL) TRY(pass_on(plan, passed_environment[i], value, err));
     }
-    plan->environment[count] = NULL;
+    memcpy(plan->environment + count, plan->passed, sizeof(char *) * plan->passed_count);
+    plan->environment[count + plan->passed_count] = NULL;
     return ISCHIA_OK;
 }
 
 static void plan_finish(struct plan *plan)
 {
-    for (int i = 0; i < PASSED; i++) free(plan->passed[i]);
+    for (size_t i = 0; i < plan->passed_count; i++) free(plan->passed[i]);
 }
 
 /* ------------------------------------------------------------------------- in the child */

@@ -58,6 +58,13 @@ static struct sample peak_of(int count, const struct sample *s)
     return s[best];
 }
 
+/* The line through two samples, at a depth. */
+static struct sample along_line(const struct sample *a, const struct sample *b, double depth_mm)
+{
+    const double slope = (b->value - a->value) / (b->depth_mm - a->depth_mm);
+    return (struct sample){depth_mm, b->value + slope * (depth_mm - b->depth_mm)};
+}
+
 struct axis_strain axis_strain_of(const struct mesh *mesh, const double (*u)[3])
 {
     enum { LEVELS_MAX = 128 };
@@ -71,6 +78,12 @@ struct axis_strain axis_strain_of(const struct mesh *mesh, const double (*u)[3])
         raw[i].depth_mm = (recovered[i].depth_mm + recovered[i + 1].depth_mm) / 2;
         raw[i].value = raw_shear(mesh, u, i);
     }
+    int raw_count = count - 1;
+    if (raw_count >= 2) { /* the muscle's end, where thin layers have their maximum */
+        raw[raw_count] =
+            along_line(&raw[raw_count - 2], &raw[raw_count - 1], recovered[count - 1].depth_mm);
+        raw_count++;
+    }
     const struct sample peak = peak_of(count, recovered);
-    return (struct axis_strain){peak.value, peak_of(count - 1, raw).value, peak.depth_mm};
+    return (struct axis_strain){peak.value, peak_of(raw_count, raw).value, peak.depth_mm};
 }

@@ -36,9 +36,6 @@ struct mesh_divisions {
     int skin;   /* through the skin                                                 */
 };
 extern const struct mesh_divisions mesh_divisions[ISCHIA_RESOLUTION_COUNT];
-/* The coarser mesh that each resolution is solved on as well, to extrapolate to ever finer meshes
- * and to know the error: the same proportions, fewer divisions; across = 0: none. */
-extern const struct mesh_divisions mesh_companions[ISCHIA_RESOLUTION_COUNT];
 
 struct mesh {
     int node_count;

@@ -16,7 +16,7 @@
  *       |_____|_x_|__x
  *
  * Spacings are functions of the fraction along a direction, so that the same fraction is the same
- * place in meshes of any divisions (extrapolation relies on it).
+ * place in meshes of any divisions (the studies of convergence rely on it).
  */
 #include <assert.h>
 #include <math.h>
@@ -26,24 +26,22 @@
 #include "solver/mesh.h"
 
 const struct mesh_divisions mesh_divisions[ISCHIA_RESOLUTION_COUNT] = {
-    [ISCHIA_COARSE] = {.across = 4, .around = 2, .radial = 6, .fat = 2, .skin = 1},
-    [ISCHIA_STANDARD] = {.across = 8, .around = 3, .radial = 12, .fat = 4, .skin = 1},
-    [ISCHIA_FINE] = {.across = 12, .around = 5, .radial = 18, .fat = 6, .skin = 1},
-};
-
-const struct mesh_divisions mesh_companions[ISCHIA_RESOLUTION_COUNT] = {
-    [ISCHIA_STANDARD] = {.across = 6, .around = 2, .radial = 9, .fat = 3, .skin = 1},
-    [ISCHIA_FINE] = {.across = 8, .around = 3, .radial = 12, .fat = 4, .skin = 1},
+    [ISCHIA_COARSE] = {.across = 4, .around = 2, .radial = 8, .fat = 2, .skin = 1},
+    [ISCHIA_STANDARD] = {.across = 8, .around = 2, .radial = 22, .fat = 5, .skin = 1},
+    [ISCHIA_FINE] = {.across = 10, .around = 4, .radial = 34, .fat = 8, .skin = 1},
 };
 
 /* How far the core patch reaches over the quarter disc: along its axes, and at its corner. */
-static const double core_axis_fraction = 0.55;
-static const double core_corner_fraction = 0.46;
+static const double core_axis_fraction = 0.62;
+static const double core_corner_fraction = 0.52;
 /* Slope of the spacing at the axis, 1 for even spacing: on the bowl and on the outer faces. */
 static const double bowl_axis_slope = 0.8;
-static const double outer_axis_slope = 0.2;
-/* The same along the lines from the bone outward. */
-static const double radial_bone_slope = 0.4;
+static const double outer_axis_slope = 0.12;
+/* The same along the lines from the bone outward, at the bone and at their outer ends, and through
+ * the fat at the muscle: thin layers of large strain lie there. */
+static const double radial_bone_slope = 0.1;
+static const double radial_outer_slope = 0.3;
+static const double fat_muscle_slope = 0.4;
 /* Tissue beyond the bone's exit from the box top, at the least. */
 static const double exit_margin_mm = 10;
 /* A box wider than this L/h has the cells of one of this width, but for the outer half of them,
@@ -131,8 +129,11 @@ static struct local_geometry geometry_of(const struct ischia_case *c)
     return g;
 }
 
-/* Odd-cubic spacing on [0, 1]: slope `slope` at 0, larger cells further out. */
-static double graded(double t, double slope) { return t * (slope + (1 - slope) * t * (2 - t)); }
+/* Spacing on [0, 1]: the cubic with the slope `first` at 0 and `last` at 1. */
+static double graded(double t, double first, double last)
+{
+    return t * (first + t * (3 - 2 * first - last + t * (first + last - 2)));
+}
 
 /* The share of the stretch that a place at the fraction t has: none in the inner half. */
 static double stretched(double t) { return pow(fmax(0, 2 * t - 1), 3); }
@@ -172,7 +173,7 @@ enum patch { PATCH_CORE, PATCH_X, PATCH_Y };
 static void core_disc_point(double a, double b, double ret[2])
 {
     const double s = core_axis_fraction, d = core_corner_fraction;
-    const double u = graded(a, bowl_axis_slope), w = graded(b, bowl_axis_slope);
+    const double u = graded(a, bowl_axis_slope, 1), w = graded(b, bowl_axis_slope, 1);
     ret[0] = s * u * (1 - w) + d * u * w;
     ret[1] = s * w * (1 - u) + d * u * w;
 }
@@ -184,7 +185,7 @@ static void bowl_patch_point(const struct local_geometry *g, enum patch patch, d
     if (patch == PATCH_CORE) {
         core_disc_point(a, b, p);
     } else {
-        const double angle = M_PI_4 * graded(a, bowl_axis_slope);
+        const double angle = M_PI_4 * graded(a, bowl_axis_slope, 1);
         core_disc_point(1, a, p);
         p[0] = (1 - b) * p[0] + b * cos(angle);
         p[1] = (1 - b) * p[1] + b * sin(angle);
@@ -200,7 +201,7 @@ static void bowl_patch_point(const struct local_geometry *g, enum patch patch, d
 /* Where the fraction t of an outer face's width is, with the share `stretch` of the stretch. */
 static double outer_place(const struct local_geometry *g, double t, double stretch)
 {
-    return (g->half_width - g->stretch) * graded(t, outer_axis_slope) +
+    return (g->half_width - g->stretch) * graded(t, outer_axis_slope, 1) +
            stretch * g->stretch * stretched(t);
 }
 
@@ -281,9 +282,17 @@ static void place_muscle_line(struct mesh *m, const struct local_geometry *g, en
     for (int l = 0; l <= d->radial; l++) {
         const double t = (double)l / d->radial;
         double *X = m->X_mm[muscle_node(d, patch, i, j, l)];
-        lerp3(bowl, inner, graded(t, radial_bone_slope), X);
+        lerp3(bowl, inner, graded(t, radial_bone_slope, radial_outer_slope), X);
         for (int k = 0; k < 3; k++) X[k] += stretched(t) * (outer[k] - inner[k]);
     }
+}
+
+/* z of a layer of the columns below the muscle; layer 0 is the muscle's bottom. */
+static double column_z(const struct mesh_divisions *d, const struct local_geometry *g, int layer)
+{
+    if (layer > d->fat) return g->skin_z * (d->fat + d->skin - layer) / d->skin;
+    return g->muscle_z +
+           (g->skin_z - g->muscle_z) * graded((double)layer / d->fat, fat_muscle_slope, 1);
 }
 
 static void place_column(struct mesh *m, const struct local_geometry *g, int i, int j)
@@ -294,8 +303,7 @@ static void place_column(struct mesh *m, const struct local_geometry *g, int i, 
         double *X = m->X_mm[column_node(d, i, j, k)];
         X[0] = top[0];
         X[1] = top[1];
-        X[2] = k <= d->fat ? g->muscle_z + (g->skin_z - g->muscle_z) * k / d->fat
-                           : g->skin_z * (d->fat + d->skin - k) / d->skin;
+        X[2] = column_z(d, g, k);
     }
 }
 

@@ -7,14 +7,15 @@
  */
 #include "solver/path.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double step_of_height = 0.07;     /* of the unloaded height             */
-static const double step_of_remaining = 0.155; /* of the height that is left         */
-static const double first_step = 0.01;         /* of the unloaded height             */
-static const double step_floor = 1e-4;         /* of the unloaded height: give up    */
+static const double step_of_height = 0.09;    /* of the unloaded height             */
+static const double step_of_remaining = 0.19; /* of the height that is left         */
+static const double first_step = 0.01;        /* of the unloaded height             */
+static const double step_floor = 1e-4;        /* of the unloaded height: give up    */
 /* A step this small that does not converge soon is not too long: the tissue snaps to another fold
  * there, and the way down needs many iterations. */
 static const double snap_step = 0.005;
@@ -22,10 +23,11 @@ static const double snap_step = 0.005;
  * the work only, each a thousandth of it. */
 static const double path_tolerance = 1e-3;
 static const double final_tolerance = 1e-8;
-/* While there is hardly any force or work yet, errors are compared with these shares of the final
- * force, and of that times the height; but never with more than so many times what there is. */
-static const double small_force = 0.1;
-static const double small_work = 0.01;
+/* While there is hardly any force or work yet, errors are compared with a tenth of the force that a
+ * quarter of a side carries in sitting, and with a hundredth of that over the tissue's height; but
+ * never with more than so many times what there is. */
+static const double small_force_N = 7.5;
+static const double small_work_N = 0.75;
 static const double small_most = 20;
 /* A step that loses a larger share of the work than this, though it converged, has left the branch
  * of equilibria that the path is on: it is undone and halved. */
@@ -65,13 +67,18 @@ struct path {
     double (*anchor_mm)[2];        /* [node] of the friction springs there        */
     struct newton_tangent ahead;   /* the tangent of a step that is being weighed */
     double height_mm;
-    double target_N;
-    const struct path_effort *effort;
+    double target_N; /* of the press that is under way   */
+    struct path_effort effort;
     int nodes;
+    double ceiling_mm;           /* of the next step                                       */
+    int tries;                   /* steps tried, well or not                               */
+    struct path_report on_way;   /* of the steps that every larger force needs too         */
+    bool started, serves_larger; /* last, tangent, ceiling and on_way are such a step's    */
 };
 
-static void path_finish(struct path *p)
+void path_destroy(struct path *p)
 {
+    if (p == NULL) return;
     newton_destroy(p->newton);
     free(p->u_mm);
     free(p->tangent.direction);
@@ -80,6 +87,7 @@ static void path_finish(struct path *p)
     free(p->anchor_mm);
     free(p->ahead.direction);
     free(p->ahead.normal_rate_N_mm);
+    free(p);
 }
 
 static enum ischia_code path_init(struct path *p, struct ischia_error *err)
@@ -181,13 +189,22 @@ static double lost_Nmm(const struct path_point *last, const struct path_point *n
 /* The first step has no work to compare with yet, and a real snap loses energy at any length. */
 static bool stays_on_branch(const struct path *p, const struct path_point *now)
 {
-    const double scale_Nmm = error_scale(now->work_Nmm, small_work * p->target_N * p->height_mm);
+    const double scale_Nmm = error_scale(now->work_Nmm, small_work_N * p->height_mm);
     return p->report->load_steps == 0 || now->d_mm - p->last.d_mm <= snap_step * p->height_mm ||
            fabs(lost_Nmm(&p->last, now)) <= lost_share_max * scale_Nmm;
 }
 
-/* Books a converged step. */
-static enum ischia_code book(struct path *p, const struct path_point *now, struct ischia_error *err)
+/* Tells of a converged step. */
+static enum ischia_code tell(struct path *p, const struct path_point *now, struct ischia_error *err)
+{
+    p->report->load_steps++;
+    p->report->last_force_N = fmax(p->report->last_force_N, fmin(now->force_N, p->target_N));
+    if (p->observer == NULL || p->observer->on_step == NULL) return ISCHIA_OK;
+    return p->observer->on_step(p->observer->context, p->state, err);
+}
+
+/* Goes on from a converged step. */
+static void book(struct path *p, const struct path_point *now)
 {
     const size_t nodes = (size_t)p->nodes;
     const struct newton_tangent before = p->tangent;
@@ -197,10 +214,6 @@ static enum ischia_code book(struct path *p, const struct path_point *now, struc
     memcpy(p->u_mm, p->state->u_mm, sizeof *p->u_mm * nodes);
     memcpy(p->normal_N, p->seat->normal_N, sizeof *p->normal_N * nodes);
     memcpy(p->anchor_mm, p->seat->anchor_mm, sizeof *p->anchor_mm * nodes);
-    p->report->load_steps++;
-    p->report->last_force_N = fmax(p->report->last_force_N, fmin(now->force_N, p->target_N));
-    if (p->observer == NULL || p->observer->on_step == NULL) return ISCHIA_OK;
-    return p->observer->on_step(p->observer->context, p->state, err);
 }
 
 /* The state of rest: no force, but a tangent. */
@@ -211,6 +224,7 @@ static enum ischia_code start(struct path *p, struct ischia_error *err)
     newton_linearise(p->newton, p->state);
     TRY(newton_tangent(p->newton, p->state, &p->tangent, err));
     p->last.stiffness_N_mm = p->tangent.stiffness_N_mm;
+    p->started = true;
     return ISCHIA_OK;
 }
 
@@ -225,7 +239,7 @@ struct step {
 static double step_ceiling_mm(const struct path *p)
 {
     if (p->report->load_steps == 0) return first_step * p->height_mm;
-    return p->effort->pace *
+    return p->effort.pace *
            fmin(step_of_height * p->height_mm, step_of_remaining * (p->height_mm - p->last.d_mm));
 }
 
@@ -245,10 +259,10 @@ static enum ischia_code try_step(struct path *p, const struct step *step,
 {
     const bool snapping = step->dd_mm < snap_step * p->height_mm;
     const double predicted_N = p->last.force_N + fmax(p->last.stiffness_N_mm, 0) * step->dd_mm;
-    const struct newton_control on_the_way = {
-        .force_N = error_scale(predicted_N, small_force * p->target_N),
-        .tolerance = path_tolerance,
-        .iterations_max = snapping ? SNAP_ITERATIONS_MAX : PATH_ITERATIONS_MAX};
+    const struct newton_control on_the_way = {.force_N = error_scale(predicted_N, small_force_N),
+                                              .tolerance = path_tolerance,
+                                              .iterations_max = snapping ? SNAP_ITERATIONS_MAX
+                                                                         : PATH_ITERATIONS_MAX};
     const struct newton_control final = {.force_controlled = true,
                                          .force_N = p->target_N,
                                          .tolerance = final_tolerance,
@@ -262,31 +276,96 @@ static enum ischia_code try_step(struct path *p, const struct step *step,
     return ISCHIA_OK;
 }
 
-static enum ischia_code follow(struct path *p, struct ischia_error *err)
+/* A step that leaves for the target leaves the way of larger forces; where it does not arrive,
+ * steps are halved that a larger force would have taken whole. */
+static void keep_way(struct path *p, const struct step *step, bool first)
 {
-    double ceiling_mm = HUGE_VAL;
-    TRY(start(p, err));
-    for (int tries = 0; tries < TRIES_MAX && p->report->load_steps < LOAD_STEPS_MAX &&
-                        p->report->factorisations < p->effort->factorisations_max;
-         tries++) {
+    if (!step->final) return;
+    p->serves_larger = first;
+    if (first) p->on_way = *p->report;
+}
+
+static bool may_go_on(const struct path *p)
+{
+    return p->tries < TRIES_MAX && p->report->load_steps < LOAD_STEPS_MAX &&
+           p->report->factorisations < p->effort.factorisations_max &&
+           p->ceiling_mm >= step_floor * p->height_mm;
+}
+
+/* To the target, or as far as it goes: report->reason. *ret is the last converged step. */
+static enum ischia_code follow(struct path *p, struct path_point *ret, struct ischia_error *err)
+{
+    bool left = false; /* a step has left for the target before */
+    while (may_go_on(p)) {
         struct newton_report newton;
-        struct path_point now;
-        const struct step step = next_step(p, ceiling_mm);
+        const struct step step = next_step(p, p->ceiling_mm);
+        keep_way(p, &step, !left);
+        left = left || step.final;
+        if (!step.final) p->tries++;
         TRY(try_step(p, &step, &newton, err));
-        if (newton.reason > 0) TRY(weigh(p, &now, err));
-        if (newton.reason > 0 && stays_on_branch(p, &now)) {
-            TRY(book(p, &now, err));
+        if (newton.reason > 0) TRY(weigh(p, ret, err));
+        if (newton.reason > 0 && stays_on_branch(p, ret)) {
+            TRY(tell(p, ret, err));
             if (step.final) return ISCHIA_OK;
-            ceiling_mm *= 2;
+            book(p, ret);
+            p->ceiling_mm *= 2;
             continue;
         }
-        ceiling_mm = fmin(step.dd_mm, p->state->d_mm - p->last.d_mm) / 2;
-        if (!(ceiling_mm >= step_floor * p->height_mm)) break;
+        p->ceiling_mm = fmin(step.dd_mm, p->state->d_mm - p->last.d_mm) / 2;
         restore(p);
     }
     p->report->reason = p->report->reason < 0 ? p->report->reason : ISCHIA_DIVERGED_STEP;
     p->report->tried = "the load step was halved down to its floor";
-    restore(p);
+    p->serves_larger = false;
+    *ret = p->last;
+    return ISCHIA_OK;
+}
+
+enum ischia_code path_create(struct path **ret, struct body *body, struct assembly *assembly,
+                             struct seat *seat, const struct path_effort *effort,
+                             struct equilibrium *state, struct ischia_error *err)
+{
+    struct path *p = calloc(1, sizeof *p);
+    CHECK(p != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the load path");
+    *p = (struct path){.body = body,
+                       .assembly = assembly,
+                       .seat = seat,
+                       .state = state,
+                       .height_mm = body->mesh->tip_z_mm,
+                       .effort = *effort,
+                       .nodes = body->mesh->node_count,
+                       .ceiling_mm = HUGE_VAL,
+                       .on_way = {.reason = ISCHIA_NOT_STARTED, .tried = ""}};
+    const enum ischia_code code = path_init(p, err);
+    if (code == ISCHIA_OK)
+        *ret = p;
+    else
+        path_destroy(p);
+    return code;
+}
+
+bool path_serves(const struct path *p, double force_N)
+{
+    return !p->started || (p->serves_larger && force_N >= p->target_N);
+}
+
+enum ischia_code path_press(struct path *p, double force_N, const struct path_observer *observer,
+                            struct path_report *ret_report, struct ischia_error *err)
+{
+    struct path_report report = p->on_way;
+    const struct path_point rest = {0};
+    struct path_point end = {0};
+    assert(path_serves(p, force_N));
+    p->observer = observer;
+    p->report = &report;
+    p->target_N = force_N;
+    if (p->started)
+        restore(p);
+    else
+        TRY(start(p, err));
+    TRY(follow(p, &end, err));
+    report.energy_residual = lost_Nmm(&rest, &end) / end.work_Nmm;
+    *ret_report = report;
     return ISCHIA_OK;
 }
 
@@ -295,24 +374,9 @@ enum ischia_code path_follow(struct body *body, struct assembly *assembly, struc
                              const struct path_observer *observer, struct equilibrium *state,
                              struct path_report *ret_report, struct ischia_error *err)
 {
-    struct path_report report = {.reason = ISCHIA_NOT_STARTED, .tried = ""};
-    struct path p = {.body = body,
-                     .assembly = assembly,
-                     .seat = seat,
-                     .observer = observer,
-                     .state = state,
-                     .report = &report,
-                     .height_mm = body->mesh->tip_z_mm,
-                     .target_N = force_N,
-                     .effort = effort,
-                     .nodes = body->mesh->node_count};
-    enum ischia_code code = path_init(&p, err);
-    if (code == ISCHIA_OK) code = follow(&p, err);
-    if (code == ISCHIA_OK) {
-        const struct path_point rest = {0};
-        report.energy_residual = lost_Nmm(&rest, &p.last) / p.last.work_Nmm;
-        *ret_report = report;
-    }
-    path_finish(&p);
+    struct path *p = NULL;
+    TRY(path_create(&p, body, assembly, seat, effort, state, err));
+    const enum ischia_code code = path_press(p, force_N, observer, ret_report, err);
+    path_destroy(p);
     return code;
 }

@@ -35,8 +35,33 @@ struct path_observer {
     void *context;
 };
 
-/* Follows the path from rest to force_N (of the quarter model); *state is zero on entry, and ends
- * in the last converged state. */
+/*
+ * A path remembers the last step that every larger force needs too, and goes on from there: a side
+ * pressed with three forces, the smallest first, costs little more than with the largest alone, and
+ * each has the bits that it has from rest. The steps on the way know nothing of the force that is
+ * wanted in the end.
+ */
+struct path;
+
+/* From rest: *state is zero. All of them stay the caller's and must outlive the path.
+ * ISCHIA_E_MEMORY. */
+ISCHIA_MUST_CHECK enum ischia_code
+path_create(struct path **ret, struct body *body, struct assembly *assembly, struct seat *seat,
+            const struct path_effort *effort, struct equilibrium *state, struct ischia_error *err);
+void path_destroy(struct path *path); /* NULL allowed */
+
+/* True when the path can go on to this force (of the quarter model): it has gone nowhere yet, or
+ * reached a force that was not larger, at the first attempt of its last step. */
+bool path_serves(const struct path *path, double force_N);
+
+/* Presses until the seat carries force_N, which the path serves (asserted); the state ends in the
+ * last converged step. Reports of all steps from rest, whether taken now or before. After an error
+ * the path is of no more use. */
+ISCHIA_MUST_CHECK enum ischia_code
+path_press(struct path *path, double force_N, const struct path_observer *observer,
+           struct path_report *ret_report, struct ischia_error *err);
+
+/* One path from rest to one force. */
 ISCHIA_MUST_CHECK enum ischia_code
 path_follow(struct body *body, struct assembly *assembly, struct seat *seat, double force_N,
             const struct path_effort *effort, const struct path_observer *observer,

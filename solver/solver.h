@@ -43,8 +43,12 @@ ISCHIA_MUST_CHECK enum ischia_code ischia_solver_create(struct ischia_solver **r
                                                         struct ischia_error *err);
 void ischia_solver_destroy(struct ischia_solver *solver); /* NULL allowed */
 
+/* Drops what is kept of the last solve, a person's side: the next starts from rest. */
+void ischia_solver_forget(struct ischia_solver *solver);
+
 /*
- * Solves a valid case (ischia_case_is_valid, asserted).
+ * Solves a valid case (ischia_case_is_valid, asserted). The side of the last solve with a larger
+ * force goes on from there where its path allows it: the same bits, sooner.
  *
  * ISCHIA_OK: *ret_result is filled, converged or not: look at numerics.reason. ret_field (NULL
  * allowed) then holds the displacements, to be freed with ischia_field_finish; it is empty unless

@@ -117,7 +117,8 @@ static enum ischia_code read_row(struct cohort *k, struct ischia_error *err)
         if (faults.count > 0) refuse_faults(k, row, &faults);
     }
     k->next_read++;
-    if (row->state == ROW_SOLVING) return crew_give(&k->crew, k->next_read - 1, &row->c, err);
+    if (row->state == ROW_SOLVING)
+        return crew_give(&k->crew, crew_idle(&k->crew), k->next_read - 1, &row->c, err);
     return ISCHIA_OK;
 }
 
@@ -189,7 +190,8 @@ static enum ischia_code write_finished(struct cohort *k, struct ischia_error *er
 
 static bool may_read(const struct cohort *k)
 {
-    return !k->all_read && k->next_read - k->next_written < WINDOW && crew_has_idle(&k->crew);
+    return !k->all_read && k->next_read - k->next_written < WINDOW &&
+           crew_idle(&k->crew) != CREW_NOBODY;
 }
 
 static enum ischia_code solve_rows(struct cohort *k, struct ischia_error *err)

@@ -146,14 +146,14 @@ void crew_stop(struct crew *crew)
     crew->count = 0;
 }
 
-static int idle_member(const struct crew *crew)
+bool crew_is_idle(const struct crew *crew, int member) { return crew->member[member].job < 0; }
+
+int crew_idle(const struct crew *crew)
 {
     for (int i = 0; i < crew->count; i++)
-        if (crew->member[i].job < 0) return i;
-    return -1;
+        if (crew_is_idle(crew, i)) return i;
+    return CREW_NOBODY;
 }
-
-bool crew_has_idle(const struct crew *crew) { return idle_member(crew) >= 0; }
 
 bool crew_is_working(const struct crew *crew)
 {
@@ -162,12 +162,12 @@ bool crew_is_working(const struct crew *crew)
     return false;
 }
 
-enum ischia_code crew_give(struct crew *crew, long job, const struct ischia_case *c,
+enum ischia_code crew_give(struct crew *crew, int number, long job, const struct ischia_case *c,
                            struct ischia_error *err)
 {
     struct job message;
-    assert(crew_has_idle(crew) && job >= 0);
-    struct crew_member *member = &crew->member[idle_member(crew)];
+    assert(number >= 0 && number < crew->count && crew_is_idle(crew, number) && job >= 0);
+    struct crew_member *member = &crew->member[number];
     memset(&message, 0, sizeof message);
     message.number = job;
     message.c = *c;
@@ -219,5 +219,7 @@ enum ischia_code crew_wait(struct crew *crew, struct crew_answer *ret, struct is
     CHECK(ready > 0, err, ISCHIA_E_IO, "cannot wait for solver processes: %s", strerror(errno));
     int first = 0;
     while (polled[first].revents == 0) first++;
-    return hear(crew, &crew->member[first], ret, err);
+    TRY(hear(crew, &crew->member[first], ret, err));
+    ret->member = first;
+    return ISCHIA_OK;
 }

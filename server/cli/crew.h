@@ -29,6 +29,7 @@ struct crew {
 
 struct crew_answer {
     long job;
+    int member;            /* that gave it */
     enum ischia_code code; /* ISCHIA_OK: result holds the end of the solve, converged or not */
     char message[ISCHIA_ERROR_MESSAGE_BYTES]; /* unless ISCHIA_OK */
     struct ischia_result result;
@@ -39,12 +40,15 @@ ISCHIA_MUST_CHECK enum ischia_code crew_start(struct crew *ret, int count,
                                               struct ischia_error *err);
 void crew_stop(struct crew *crew); /* ends them all, working or not */
 
-/* True when a member waits for work; when one has some. */
-bool crew_has_idle(const struct crew *crew);
+enum { CREW_NOBODY = -1 };
+
+/* A member that waits for work, or CREW_NOBODY; whether this one does; whether any has work. */
+int crew_idle(const struct crew *crew);
+bool crew_is_idle(const struct crew *crew, int member);
 bool crew_is_working(const struct crew *crew);
 
-/* Gives a case to an idle member (there is one, asserted). job: 0 or more, the caller's number. */
-ISCHIA_MUST_CHECK enum ischia_code crew_give(struct crew *crew, long job,
+/* Gives a case to an idle member (asserted). job: 0 or more, the caller's number. */
+ISCHIA_MUST_CHECK enum ischia_code crew_give(struct crew *crew, int member, long job,
                                              const struct ischia_case *c, struct ischia_error *err);
 
 /* Waits for the next answer (somebody is working, asserted). */

@@ -7,6 +7,7 @@
 
 #include "api/json.h"
 #include "api/text.h"
+#include "server/blas_environment.h"
 #include "server/cli/command.h"
 #include "solver/case.h"
 
@@ -83,37 +84,13 @@ static int command_help(int argc, char **argv)
     return command->run(2, copy);
 }
 
-/*
- * A BLAS with threads sums in an order that depends on them, and OpenBLAS starts its threads when
- * it is loaded, before main: so the environment is set and the program started once more.
- * CHOLMOD asks OpenMP for four threads by number; only the limit stops that.
- */
-static void ensure_one_blas_thread(char **argv)
-{
-    static const char *const names[] = {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS",
-                                        "OMP_THREAD_LIMIT"};
-    bool changed = false;
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        const char *value = getenv(names[i]);
-        if (value != NULL && strcmp(value, "1") == 0) continue;
-        if (setenv(names[i], "1", 1) != 0) return;
-        changed = true;
-    }
-    if (!changed) return;
-    (void)execv("/proc/self/exe", argv);
-    (void)fprintf(stderr,
-                  "ischia: cannot restart with one BLAS thread (%s): set "
-                  "OPENBLAS_NUM_THREADS=1 and OMP_NUM_THREADS=1 for repeatable bits\n",
-                  strerror(errno));
-}
-
 int main(int argc, char **argv)
 {
     if (argc < 2) {
         print_overview(stderr);
         return EXIT_BAD_INPUT;
     }
-    ensure_one_blas_thread(argv);
+    blas_environment_ensure("ischia", argv);
     const char *name = argv[1];
     if (strcmp(name, "--version") == 0) name = "version";
     if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0) name = "help";

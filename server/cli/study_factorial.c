@@ -17,6 +17,7 @@
 #include "server/cli/crew.h"
 #include "server/cli/study.h"
 #include "server/cli/study_journal.h"
+#include "server/cli/study_sides.h"
 
 struct arguments {
     const char *design;
@@ -27,13 +28,20 @@ struct arguments {
     bool points, quiet;
 };
 
+/* What a process is to solve next: the rest of a side, positions in study.sides. */
+struct lane {
+    size_t next, end;
+};
+
 struct study {
     const struct arguments *arguments;
     struct study_plan plan;
     struct study_journal journal;
     struct crew crew;
     bool *died; /* [points.count] the process that solved this row died once */
-    size_t next_row;
+    struct study_sides sides;
+    size_t next_side; /* position of the first side that nobody has taken */
+    struct lane lane[CREW_MEMBERS_MAX];
     size_t total, done, failed; /* of this shard                  */
     size_t before;              /* done by an earlier run         */
     struct bar bar;
@@ -231,7 +239,7 @@ static enum ischia_code row_answered(struct study *s, const struct crew_answer *
     if (answer->code == ISCHIA_E_STATE && !s->died[row]) {
         const struct ischia_case c = design_case(&s->plan.design, &s->plan.points, row);
         s->died[row] = true;
-        return crew_give(&s->crew, answer->job, &c, err);
+        return crew_give(&s->crew, answer->member, answer->job, &c, err);
     }
     text_out_init(&text);
     put_answer(&text, answer, &s->plan);
@@ -248,26 +256,53 @@ static enum ischia_code refuse(struct study *s, size_t row, const struct ischia_
     return add_row(s, row, 0, &text, err);
 }
 
-static enum ischia_code give_row(struct study *s, size_t row, struct ischia_error *err)
+static enum ischia_code give_row(struct study *s, int member, size_t row, struct ischia_error *err)
 {
-    if (!in_shard(s, row) || s->journal.text[row] != NULL) return ISCHIA_OK;
     const struct ischia_case c = design_case(&s->plan.design, &s->plan.points, row);
     if (!ischia_case_is_valid(&c)) return refuse(s, row, &c, err);
-    return crew_give(&s->crew, (long)row, &c, err);
+    return crew_give(&s->crew, member, (long)row, &c, err);
+}
+
+/* The next row of the side that a member is at, or the first of the next; false: none is left. */
+static bool take_row(struct study *s, int member, size_t *ret)
+{
+    struct lane *lane = &s->lane[member];
+    if (lane->next == lane->end) {
+        lane->next = s->next_side;
+        lane->end = s->next_side = study_sides_end(&s->sides, s->next_side);
+    }
+    if (lane->next == lane->end) return false;
+    *ret = s->sides.row[lane->next++];
+    return true;
+}
+
+static enum ischia_code give_rows(struct study *s, struct ischia_error *err)
+{
+    for (int member = 0; member < s->crew.count; member++) {
+        size_t row;
+        while (crew_is_idle(&s->crew, member) && take_row(s, member, &row))
+            TRY(give_row(s, member, row, err));
+    }
+    return ISCHIA_OK;
 }
 
 static enum ischia_code work_through(struct study *s, struct ischia_error *err)
 {
     static struct crew_answer answer; /* large, and there is one study in a process */
     do {
-        while (s->next_row < s->plan.points.count && crew_has_idle(&s->crew))
-            TRY(give_row(s, s->next_row++, err));
+        TRY(give_rows(s, err));
         if (!crew_is_working(&s->crew)) break;
         TRY(crew_wait(&s->crew, &answer, err));
         TRY(row_answered(s, &answer, err));
         show_progress(s);
     } while (true);
     return ISCHIA_OK;
+}
+
+static bool is_unsolved(void *context, size_t row)
+{
+    const struct study *s = context;
+    return in_shard(s, row) && s->journal.text[row] == NULL;
 }
 
 static void count_finished(struct study *s)
@@ -300,6 +335,7 @@ static enum ischia_code solve_rows(struct study *s, struct ischia_error *err)
     s->died = calloc(s->plan.points.count + 1, sizeof *s->died);
     CHECK(s->died != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows",
           s->plan.points.count);
+    TRY(study_sides_init(&s->sides, &s->plan.design, &s->plan.points, is_unsolved, s, err));
     if (s->done < s->total) {
         TRY(crew_start(&s->crew, s->arguments->jobs, err));
         const enum ischia_code code = work_through(s, err);
@@ -320,6 +356,7 @@ static enum ischia_code run_study(struct study *s, struct ischia_error *err)
                            s->plan.points.count, err));
     const enum ischia_code code = solve_rows(s, err);
     study_journal_close(&s->journal);
+    study_sides_finish(&s->sides);
     free(s->died);
     return code;
 }

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
- * Where the time of a solve goes: bench_solve CASES.csv RESOLUTION [-r REPEATS] [ROW ...], with the
- * columns R1,R2,eM,eF,muM,muF,F in the order of the parameter table (other columns are skipped by
- * name). Each row is solved on this thread; the phases are timed around the solver's own calls, put
- * between at link time (--wrap), so that the solver itself holds no clock. CPU seconds.
+ * Where the time of a solve goes: bench_solve CASES.csv RESOLUTION [-w] [-r REPEATS] [ROW ...],
+ * with the columns R1,R2,eM,eF,muM,muF,F in the order of the parameter table (other columns are
+ * skipped by name). Each row is solved on this thread, from rest or, with -w (warm), by a solver
+ * that has just solved the row with nine tenths of its force; the phases are timed around the solver's
+ * own calls, put between at link time (--wrap), so that the solver itself holds no clock. CPU
+ * seconds.
  */
 #include <math.h>
 #include <stdio.h>
@@ -12,9 +14,17 @@
 #include <sys/resource.h>
 #include <time.h>
 
+#include "server/blas_environment.h"
 #include "solver/body.h"
 #include "solver/contact.h"
 #include "solver/solver.h"
+
+static const double warm_share = 0.9; /* of a row's force, solved before it */
+
+struct arguments {
+    bool warm;
+    int repeats;
+};
 
 enum phase { ASSEMBLY, ENERGY, FACTORISATION, SOLVES, CONTACT, SETUP, PHASE_COUNT };
 static const char *const phase_names[] = {"assembly", "energy",  "factor",
@@ -189,16 +199,24 @@ static int read_rows(const char *path, enum ischia_resolution resolution, struct
     return count;
 }
 
-static void solve_row(struct ischia_solver *solver, struct row *row, int repeats)
+static void solve(struct ischia_solver *solver, const struct ischia_case *c, struct row *row)
 {
-    for (int k = 0; k < repeats; k++) {
-        struct ischia_error err = {0};
+    struct ischia_error err = {0};
+    if (ischia_solve(solver, c, NULL, &row->result, NULL, &err) == ISCHIA_OK) return;
+    (void)fprintf(stderr, "row %s: %s\n", row->label, err.message);
+    exit(1);
+}
+
+static void solve_row(struct ischia_solver *solver, struct row *row, const struct arguments *a)
+{
+    struct ischia_case less = row->c;
+    less.param[ISCHIA_F] *= warm_share;
+    for (int k = 0; k < a->repeats; k++) {
+        ischia_solver_forget(solver);
+        if (a->warm) solve(solver, &less, row);
         memset(spent, 0, sizeof spent);
         const double since = cpu_seconds();
-        if (ischia_solve(solver, &row->c, NULL, &row->result, NULL, &err) != ISCHIA_OK) {
-            (void)fprintf(stderr, "row %s: %s\n", row->label, err.message);
-            exit(1);
-        }
+        solve(solver, &row->c, row);
         const double total = cpu_seconds() - since;
         if (k > 0 && total >= row->total_s) continue;
         row->total_s = total;
@@ -266,10 +284,20 @@ int main(int argc, char **argv)
     static struct row rows[CASES_MAX];
     enum ischia_resolution resolution;
     struct ischia_solver *solver = NULL;
-    const bool repeated = argc > 4 && strcmp(argv[3], "-r") == 0;
-    const int first = repeated ? 5 : 3, repeats = repeated ? (int)strtol(argv[4], NULL, 10) : 1;
+    struct arguments a = {.repeats = 1};
+    int first = 3;
+    if (argc > first && strcmp(argv[first], "-w") == 0) {
+        a.warm = true;
+        first++;
+    }
+    if (argc > first + 1 && strcmp(argv[first], "-r") == 0) {
+        a.repeats = (int)strtol(argv[first + 1], NULL, 10);
+        first += 2;
+    }
+    blas_environment_ensure("bench_solve", argv);
     if (argc < 3 || !resolution_from_name(argv[2], &resolution)) {
-        (void)fprintf(stderr, "usage: bench_solve CASES.csv RESOLUTION [-r REPEATS] [ROW ...]\n");
+        (void)fprintf(stderr,
+                      "usage: bench_solve CASES.csv RESOLUTION [-w] [-r REPEATS] [ROW ...]\n");
         return 2;
     }
     const int count = read_rows(argv[1], resolution, rows);
@@ -278,7 +306,7 @@ int main(int argc, char **argv)
     print_header();
     for (int i = 0; i < count; i++) {
         if (!chosen(rows[i].label, argc - first, argv + first)) continue;
-        solve_row(solver, &rows[i], repeats);
+        solve_row(solver, &rows[i], &a);
         print_row(&rows[i]);
         rows[solved++] = rows[i];
     }

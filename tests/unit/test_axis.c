@@ -74,6 +74,21 @@ static void cubic_field_peaks_where_it_should(void **state)
     assert_near(s.raw, (1 + (a + b) / 2 - 1) / 2, 1e-14);
 }
 
+/* Shear that rises with depth is largest at the muscle's end, half an element beyond the last mean:
+ * both readings are the same there when it rises evenly. */
+static void the_muscles_end_counts(void **state)
+{
+    (void)state;
+    const struct mesh mesh = axis_mesh();
+    for (int l = 0; l < LEVELS; l++)
+        for (int k = 0; k < 5; k++)
+            for (int c = 0; c < 2; c++) u[5 * l + k][c] = 0.1 * l * X[5 * l + k][c];
+    /* raw: (1 + 0.1 l - 1) / 2, z does not move; means at l = 0.5, 1.5, 2.5; the end is l = 3 */
+    const struct axis_strain s = axis_strain_of(&mesh, (const double(*)[3])u);
+    assert_near(s.raw, 0.15, 1e-14);
+    assert_near(s.depth_mm, 9, 1e-12);
+}
+
 static void a_folded_level_does_not_count(void **state)
 {
     (void)state;
@@ -91,6 +106,7 @@ int main(void)
         cmocka_unit_test(at_rest_there_is_no_shear),
         cmocka_unit_test(homogeneous_field_is_read_exactly),
         cmocka_unit_test(cubic_field_peaks_where_it_should),
+        cmocka_unit_test(the_muscles_end_counts),
         cmocka_unit_test(a_folded_level_does_not_count),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

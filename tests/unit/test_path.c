@@ -129,6 +129,38 @@ static void a_slower_pace_takes_more_steps(void **state)
     bench_finish(&b);
 }
 
+/* Pressed with more and more: the bits of a path from rest to each, and its report. */
+static void a_path_goes_on_to_larger_forces(void **state)
+{
+    (void)state;
+    static const double force_N[] = {0.5, 0.5, 1, 3};
+    struct bench a;
+    struct path *path;
+    bench_make(&a);
+    assert_int_equal(
+        path_create(&path, &a.body, &a.assembly, &a.seat, &usual_effort, &a.state, NULL),
+        ISCHIA_OK);
+    for (size_t i = 0; i < sizeof force_N / sizeof force_N[0]; i++) {
+        struct bench b;
+        struct path_report on, fresh;
+        bench_make(&b);
+        assert_true(path_serves(path, force_N[i]));
+        assert_int_equal(path_press(path, force_N[i], NULL, &on, NULL), ISCHIA_OK);
+        assert_int_equal(follow(&b, force_N[i], NULL, &fresh, NULL), ISCHIA_OK);
+        assert_int_equal(on.reason, ISCHIA_CONVERGED);
+        assert_memory_equal(a.state.u_mm, b.state.u_mm,
+                            (size_t)a.mesh.node_count * sizeof *a.state.u_mm);
+        assert_true(on.energy_residual == fresh.energy_residual);
+        assert_true(on.last_force_N == fresh.last_force_N);
+        assert_int_equal(on.load_steps, fresh.load_steps);
+        assert_int_equal(on.factorisations, fresh.factorisations);
+        bench_finish(&b);
+    }
+    assert_false(path_serves(path, 1)); /* it has gone by */
+    path_destroy(path);
+    bench_finish(&a);
+}
+
 /* A path that takes more factorisations than it may ends short, and says so. */
 static void a_path_ends_at_its_limit_of_work(void **state)
 {
@@ -192,6 +224,7 @@ int main(void)
         cmocka_unit_test(path_ends_at_the_force),
         cmocka_unit_test(watching_changes_nothing),
         cmocka_unit_test(a_slower_pace_takes_more_steps),
+        cmocka_unit_test(a_path_goes_on_to_larger_forces),
         cmocka_unit_test(a_path_ends_at_its_limit_of_work),
         cmocka_unit_test(observers_end_the_path),
         cmocka_unit_test(what_cannot_be_reached_has_a_reason),

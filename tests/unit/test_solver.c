@@ -133,6 +133,39 @@ static void same_case_same_bits(void **state)
 
 /* --- observers -------------------------------------------------------------------------------- */
 
+/* Whatever was solved before: from rest, or on from a smaller force of the same side. */
+static void a_larger_force_goes_on_with_the_same_bits(void **state)
+{
+    (void)state;
+    static const double share[] = {0.4, 0.4, 0.8, 1, 0.6}; /* the last is smaller: from rest */
+    struct ischia_solver *solver = solver_make();
+    for (int variant = 0; variant < 3; variant++)
+        for (size_t i = 0; i < sizeof share / sizeof share[0]; i++) {
+            struct ischia_solver *fresh = solver_make();
+            struct ischia_case c = coarse_case(variant);
+            c.param[ISCHIA_F] *= share[i];
+            struct ischia_field field, cold_field;
+            const struct ischia_result r = solve(solver, &c, &field);
+            const struct ischia_result cold = solve(fresh, &c, &cold_field);
+            assert_true(ischia_result_converged(&r));
+            assert_memory_equal(&r.strain, &cold.strain, sizeof r.strain);
+            assert_memory_equal(r.clusters, cold.clusters, sizeof r.clusters);
+            assert_memory_equal(&r.seat, &cold.seat, sizeof r.seat);
+            assert_int_equal(r.load_curve_count, cold.load_curve_count);
+            assert_memory_equal(r.load_curve, cold.load_curve,
+                                sizeof *r.load_curve * (size_t)r.load_curve_count);
+            assert_int_equal(r.numerics.newton_iterations, cold.numerics.newton_iterations);
+            assert_int_equal(r.numerics.factorisations, cold.numerics.factorisations);
+            assert_true(r.numerics.energy_residual == cold.numerics.energy_residual);
+            assert_memory_equal(field.displacement_mm, cold_field.displacement_mm,
+                                3 * sizeof(double) * field.node_count);
+            ischia_field_finish(&field);
+            ischia_field_finish(&cold_field);
+            ischia_solver_destroy(fresh);
+        }
+    ischia_solver_destroy(solver);
+}
+
 struct watcher {
     int calls, cancel_at; /* < 0: never */
     struct ischia_progress last;
@@ -146,6 +179,31 @@ static bool watch(void *context, const struct ischia_progress *p)
     assert_true(isfinite(p->F_N) && p->message != NULL && strlen(p->message) > 5);
     w->last = *p;
     return w->calls++ != w->cancel_at;
+}
+
+static int calls_for(struct ischia_solver *solver, const struct ischia_case *c)
+{
+    struct watcher w = {.cancel_at = -1};
+    const struct ischia_observer observer = {watch, &w};
+    struct ischia_result r;
+    assert_int_equal(ischia_solve(solver, c, &observer, &r, NULL, NULL), ISCHIA_OK);
+    return w.calls;
+}
+
+static void going_on_is_less_work_until_forgotten(void **state)
+{
+    (void)state;
+    struct ischia_solver *solver = solver_make();
+    struct ischia_case c = coarse_case(0);
+    const int from_rest = calls_for(solver, &c);
+    c.param[ISCHIA_F] *= 0.9;
+    ischia_solver_forget(solver);
+    assert_true(calls_for(solver, &c) > from_rest / 2);
+    c = coarse_case(0);
+    assert_true(calls_for(solver, &c) < from_rest / 2);
+    ischia_solver_forget(solver);
+    assert_int_equal(calls_for(solver, &c), from_rest);
+    ischia_solver_destroy(solver);
 }
 
 static void progress_never_goes_back(void **state)
@@ -224,6 +282,8 @@ int main(void)
         cmocka_unit_test(result_is_whole),
         cmocka_unit_test(field_fits_the_mesh),
         cmocka_unit_test(same_case_same_bits),
+        cmocka_unit_test(a_larger_force_goes_on_with_the_same_bits),
+        cmocka_unit_test(going_on_is_less_work_until_forgotten),
         cmocka_unit_test(progress_never_goes_back),
         cmocka_unit_test(cancelling_leaves_no_trace),
         cmocka_unit_test(hand_written_derivatives_agree),

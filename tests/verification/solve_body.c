@@ -82,7 +82,9 @@ static enum ischia_code problem_mesh(struct mesh *ret, const struct problem *p,
     if (p->size_mm[0] > 0) return block_init(ret, p->size_mm, p->divisions, p->top_flags, err);
     struct ischia_case c = ischia_case_default();
     memcpy(c.param, p->param, sizeof c.param);
-    return mesh_local_init(ret, &c, &mesh_divisions[ISCHIA_COARSE], err);
+    /* Few layers: the element of CalculiX, by Gauss points alone, folds in thin ones. */
+    const struct mesh_divisions few = {.across = 4, .around = 2, .radial = 5, .fat = 2, .skin = 1};
+    return mesh_local_init(ret, &c, &few, err);
 }
 
 static void problem_materials(const struct problem *p, struct element_material ret[TISSUE_COUNT])

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /*
  * How eps_max converges with the mesh, and whether the shipped results say how far they are off:
- * each side on three meshes of one family, whose divisions are 3, 4 and 5 times the same, with
- * twice as many layers from bone to seat for their columns as `standard`. With e_k = e + C h_k^p
- * the three give the observed order p and the limit e (Roache 1998; unequal ratios, p by
- * bisection). p is confined to [order_min, order_max]: outside it the three meshes are not yet in
- * the range where the law holds, and the limit is drawn from the finer two with the nearest p.
+ * each side on three meshes of one family, whose divisions are 2, 3 and 4 times the same. The two
+ * readings of eps_max (axis.h) converge to the same value, so that their bracket closes as h^p:
+ * least squares over the three meshes give the observed order p, and with it the middles of the
+ * brackets of the finer two give the limit (Roache 1998). p is confined to [order_min, order_max].
  *
  * usage: study_mesh SIDE ...          e.g. study_mesh 1R 7L 8L 9R 10R 12R
  * Fails when a mesh does not converge, when `standard` is further than standard_max from the limit
@@ -24,9 +23,9 @@ static const double firm_muM_kPa = 2;
 static const struct variant shipped = {0.4, 0, 1};
 enum { MESHES = 3 };
 static const struct mesh_divisions family[MESHES] = {
-    {.across = 6, .around = 3, .radial = 18, .fat = 6, .skin = 1},
-    {.across = 8, .around = 4, .radial = 24, .fat = 8, .skin = 1},
-    {.across = 10, .around = 5, .radial = 30, .fat = 10, .skin = 1},
+    {.across = 6, .around = 2, .radial = 22, .fat = 4, .skin = 1},
+    {.across = 9, .around = 3, .radial = 33, .fat = 6, .skin = 1},
+    {.across = 12, .around = 4, .radial = 44, .fat = 8, .skin = 1},
 };
 
 struct limit {
@@ -35,35 +34,39 @@ struct limit {
 
 static double size_of(int mesh) { return 1.0 / family[mesh].across; }
 
-/* (e0 - e1) / (e1 - e2) as the order p would have it. */
-static double ratio_at(double p)
+/* Slope of log bracket over log h, by least squares. */
+static double order_of(const struct axis_strain strain[MESHES])
 {
-    return (pow(size_of(0), p) - pow(size_of(1), p)) / (pow(size_of(1), p) - pow(size_of(2), p));
-}
-
-static struct limit limit_of(const double eps[MESHES])
-{
-    const double wanted = (eps[0] - eps[1]) / (eps[1] - eps[2]);
-    double low = order_min, high = order_max;
-    for (int i = 0; i < 60; i++) {
-        const double middle = (low + high) / 2;
-        if (ratio_at(middle) < wanted)
-            low = middle;
-        else
-            high = middle;
+    double x = 0, y = 0, xx = 0, xy = 0;
+    for (int k = 0; k < MESHES; k++) {
+        const double h = log(size_of(k)), b = log(fabs(strain[k].recovered - strain[k].raw));
+        x += h / MESHES;
+        y += b / MESHES;
+        xx += h * h / MESHES;
+        xy += h * b / MESHES;
     }
-    const double p = (low + high) / 2, fine = pow(size_of(2), p), coarser = pow(size_of(1), p);
-    return (struct limit){p, eps[2] + (eps[2] - eps[1]) * fine / (coarser - fine)};
+    return fmin(order_max, fmax(order_min, (xy - x * y) / (xx - x * x)));
 }
 
-static enum ischia_code solve_family(const struct ischia_case *c, double ret_eps[MESHES],
-                                     bool *ret_sound, struct ischia_error *err)
+static double middle_of(const struct axis_strain *s) { return (s->recovered + s->raw) / 2; }
+
+static struct limit limit_of(const struct axis_strain strain[MESHES])
+{
+    const double p = order_of(strain), fine = pow(size_of(MESHES - 1), p);
+    const double coarser = pow(size_of(MESHES - 2), p), eps = middle_of(&strain[MESHES - 1]);
+    return (struct limit){p,
+                          eps + (eps - middle_of(&strain[MESHES - 2])) * fine / (coarser - fine)};
+}
+
+static enum ischia_code solve_family(const struct ischia_case *c,
+                                     struct axis_strain ret_strain[MESHES], bool *ret_sound,
+                                     struct ischia_error *err)
 {
     *ret_sound = true;
     for (int k = 0; k < MESHES; k++) {
         struct outcome outcome = {0};
         TRY(solve_on(&family[k], c, &shipped, &outcome, err));
-        ret_eps[k] = outcome.eps_max;
+        ret_strain[k] = outcome.strain;
         if (!is_sound(&outcome)) *ret_sound = false;
     }
     return ISCHIA_OK;
@@ -89,17 +92,18 @@ static enum ischia_code study(const struct side *side, struct tally *tally,
 {
     const struct ischia_case c = side_case(side, ISCHIA_STANDARD);
     struct ischia_result standard = {0};
-    double eps[MESHES];
+    struct axis_strain strain[MESHES];
     bool sound;
     TRY(solve_standard(&c, &standard, err));
-    TRY(solve_family(&c, eps, &sound, err));
-    const struct limit limit = limit_of(eps);
+    TRY(solve_family(&c, strain, &sound, err));
+    const struct limit limit = limit_of(strain);
     const double off = standard.strain.eps_max - limit.eps_max;
     const bool covered = fabs(off) <= standard.numerics.eps_max_error;
-    printf("%-4s %9.4f %9.4f %9.4f %6.2f %9.4f %9.4f %9.4f %+8.2f %% %s%s\n", side->name, eps[0],
-           eps[1], eps[2], limit.order, limit.eps_max, standard.strain.eps_max,
-           standard.numerics.eps_max_error, 100 * off / limit.eps_max, covered ? "yes" : "no",
-           sound ? "" : "  a mesh has not converged");
+    printf("%-4s", side->name);
+    for (int k = 0; k < MESHES; k++) printf("  %.4f %.4f", strain[k].raw, strain[k].recovered);
+    printf(" %6.2f %9.4f %9.4f %9.4f %+8.2f %% %s%s\n", limit.order, limit.eps_max,
+           standard.strain.eps_max, standard.numerics.eps_max_error, 100 * off / limit.eps_max,
+           covered ? "yes" : "no", sound ? "" : "  a mesh has not converged");
     (void)fflush(stdout);
     tally->sides++;
     tally->covered += covered;
@@ -113,8 +117,9 @@ static enum ischia_code study(const struct side *side, struct tally *tally,
 int main(int argc, char **argv)
 {
     struct tally tally = {.passed = argc > 1};
-    printf("side    6 cells   8 cells  10 cells  order     limit  standard     error       off   "
-           "covered\n");
+    printf("      6 cells         9 cells         12 cells\n"
+           "side  raw    recov.   raw    recov.   raw    recov.  order     limit  standard     "
+           "error       off   covered\n");
     for (int i = 1; i < argc; i++) {
         struct ischia_error err;
         const struct side *side = side_of(argv[i]);

@@ -5,8 +5,7 @@
  * shipped, and the stiffness k of the friction springs (seat.h). Each is varied with the others at
  * their shipped values; nothing but these numbers changes from run to run. A last line takes the
  * load path, whose friction history depends on the steps, in SMALL_STEPS equal steps to the same
- * travel; it and its change are of the resolution's own mesh, the others' eps_max is extrapolated
- * with the companion mesh as ischia_solve does.
+ * travel.
  *
  * usage: study_regularisation RESOLUTION SIDE ...    e.g. study_regularisation standard 1R 9R
  * Fails when the shipped values are not those of ischia_solve, a run does not converge, when
@@ -43,16 +42,7 @@ static const struct {
 static enum ischia_code solve(const struct ischia_case *c, const struct variant *v,
                               struct outcome *ret, struct ischia_error *err)
 {
-    const struct mesh_divisions *divisions = &mesh_divisions[c->resolution];
-    const struct mesh_divisions *coarser = &mesh_companions[c->resolution];
-    struct outcome companion = {0};
-    TRY(solve_on(divisions, c, v, ret, err));
-    if (coarser->across == 0) return ISCHIA_OK;
-    TRY(solve_on(coarser, c, v, &companion, err));
-    const double ratio = (double)divisions->across / coarser->across;
-    if (companion.path.reason < 0) ret->path.reason = companion.path.reason;
-    ret->eps_max += (ret->eps_max - companion.eps_max) / (ratio * ratio - 1);
-    return ISCHIA_OK;
+    return solve_on(&mesh_divisions[c->resolution], c, v, ret, err);
 }
 
 /* Moves the bone alone down to d, as far in one go as leaves no element inverted. */
@@ -184,12 +174,6 @@ static enum ischia_code study_shipped(const struct ischia_case *c, const char *s
     return ISCHIA_OK;
 }
 
-/* eps_max of the mesh itself, not extrapolated. */
-static double own_eps_max(const struct outcome *o)
-{
-    return (o->strain.raw + o->strain.recovered) / 2;
-}
-
 static enum ischia_code study(const struct side *side, enum ischia_resolution resolution,
                               bool *ret_passed, struct ischia_error *err)
 {
@@ -200,7 +184,7 @@ static enum ischia_code study(const struct side *side, enum ischia_resolution re
         TRY(compare(&c, side->name, i, &shipped, ret_passed, err));
     struct outcome steady = {0};
     TRY(solve_in_small_steps(&c, &variants[0].variant, shipped.outcome.d_mm, &steady, err));
-    const double change = own_eps_max(&steady) / own_eps_max(&shipped.outcome) - 1;
+    const double change = steady.eps_max / shipped.outcome.eps_max - 1;
     print_line(side->name, &variants[0].variant, &steady, change);
     if (!is_sound(&steady) || fabs(change) > effect_max) *ret_passed = false;
     return ISCHIA_OK;
