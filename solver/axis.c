@@ -3,6 +3,9 @@
 
 #include <math.h>
 
+/* How far beyond the recovered value eps_max lies, over what it is above the raw one. */
+static const double beyond = 0.5;
+
 static double largest_shear(const double stretch[3])
 {
     const double most = fmax(stretch[0], fmax(stretch[1], stretch[2]));
@@ -85,5 +88,9 @@ struct axis_strain axis_strain_of(const struct mesh *mesh, const double (*u)[3])
         raw_count++;
     }
     const struct sample peak = peak_of(count, recovered);
-    return (struct axis_strain){peak.value, peak_of(raw_count, raw).value, peak.depth_mm};
+    const double below = peak_of(raw_count, raw).value;
+    return (struct axis_strain){.recovered = peak.value,
+                                .raw = below,
+                                .eps_max = peak.value + beyond * (peak.value - below),
+                                .depth_mm = peak.depth_mm};
 }

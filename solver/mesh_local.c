@@ -27,8 +27,8 @@
 
 const struct mesh_divisions mesh_divisions[ISCHIA_RESOLUTION_COUNT] = {
     [ISCHIA_COARSE] = {.across = 4, .around = 2, .radial = 8, .fat = 2, .skin = 1},
-    [ISCHIA_STANDARD] = {.across = 8, .around = 2, .radial = 22, .fat = 5, .skin = 1},
-    [ISCHIA_FINE] = {.across = 10, .around = 4, .radial = 34, .fat = 8, .skin = 1},
+    [ISCHIA_STANDARD] = {.across = 8, .around = 2, .radial = 16, .fat = 4, .skin = 1},
+    [ISCHIA_FINE] = {.across = 12, .around = 3, .radial = 24, .fat = 6, .skin = 1},
 };
 
 /* How far the core patch reaches over the quarter disc: along its axes, and at its corner. */

@@ -3,9 +3,9 @@
  * Where the time of a solve goes: bench_solve CASES.csv RESOLUTION [-w] [-r REPEATS] [ROW ...],
  * with the columns R1,R2,eM,eF,muM,muF,F in the order of the parameter table (other columns are
  * skipped by name). Each row is solved on this thread, from rest or, with -w (warm), by a solver
- * that has just solved the row with nine tenths of its force; the phases are timed around the solver's
- * own calls, put between at link time (--wrap), so that the solver itself holds no clock. CPU
- * seconds.
+ * that has just solved the row with nine tenths of its force; the phases are timed around the
+ * solver's own calls, put between at link time (--wrap), so that the solver itself holds no clock.
+ * CPU seconds.
  */
 #include <math.h>
 #include <stdio.h>

@@ -86,6 +86,7 @@ static void the_muscles_end_counts(void **state)
     /* raw: (1 + 0.1 l - 1) / 2, z does not move; means at l = 0.5, 1.5, 2.5; the end is l = 3 */
     const struct axis_strain s = axis_strain_of(&mesh, (const double(*)[3])u);
     assert_near(s.raw, 0.15, 1e-14);
+    assert_near(s.eps_max, s.recovered + (s.recovered - s.raw) / 2, 1e-14);
     assert_near(s.depth_mm, 9, 1e-12);
 }
 

@@ -67,7 +67,7 @@ void run_measure(const struct run *r, struct outcome *ret)
 {
     const double(*u)[3] = (const double(*)[3])r->state.u_mm;
     ret->strain = axis_strain_of(&r->mesh, u);
-    ret->eps_max = ret->strain.recovered;
+    ret->eps_max = ret->strain.eps_max;
     ret->d_mm = r->state.d_mm;
     ret->det_F_min = body_det_F_min(&r->body, u);
 }

@@ -40,7 +40,7 @@ void run_finish(struct run *r); /* a zeroed one is allowed */
 
 struct outcome {
     struct axis_strain strain;
-    double eps_max; /* recovered, as a result's */
+    double eps_max;
     struct path_report path;
     double d_mm, det_F_min;
 };
