@@ -12,7 +12,7 @@
  * whatever OMP_NUM_THREADS says; only the limit stops that.
  *
  * The kernels: Debian's OpenBLAS takes AVX2 kernels on AMD processors that have AVX-512, where its
- * AVX-512 ones (SkylakeX) are nearly twice as fast in products of matrices (docs/PERFORMANCE.md).
+ * AVX-512 ones (SkylakeX) are nearly twice as fast in products of matrices (docs/decisions, 20).
  * An operator's own OPENBLAS_CORETYPE is left alone.
  */
 struct blas_setting {

@@ -14,9 +14,9 @@
  * end the line through the last two of them, for where fat is softer than muscle a layer of some
  * 2 mm there can hold the maximum.
  *
- * Both converge to the same value from below, the raw one with some three times the error; so
- * eps_max is read beyond the recovered value, by half of what lies between the two. What lies
- * between them falls with the mesh, and measures the error (docs/decisions, 19).
+ * Both converge to the same value. On meshes like `standard` both are mostly below it, the raw one
+ * by some two to four times as much; so eps_max is read beyond the recovered value, by half of what
+ * lies between the two. That falls with the mesh, and measures the error (docs/decisions, 19).
  */
 struct axis_strain {
     double recovered; /* largest value at a node of the axis                  */
