@@ -38,6 +38,7 @@ struct study {
     struct study_plan plan;
     struct study_journal journal;
     struct crew crew;
+    bool *mine; /* [points.count] this shard's rows                                */
     bool *died; /* [points.count] the process that solved this row died once */
     struct study_sides sides;
     size_t next_side; /* position of the first side that nobody has taken */
@@ -103,7 +104,9 @@ static enum cli_parse parse_arguments(int argc, char **argv, struct arguments *a
          &a->defaults.model, NULL},
         {"--resolution", 0, "NAME", "standard, fine or coarse, likewise", &a->defaults.resolution,
          NULL},
-        {"--shard", 0, "I/N", "only rows I, I+N, I+2N, ...; `ischia study merge` joins shards",
+        {"--shard", 0, "I/N",
+         "every Nth side from side I on, a side being the rows that "
+         "differ in F alone; `ischia study merge` joins shards",
          &shard, NULL},
         {"--points", 0, NULL, "write the points and solve nothing", NULL, &a->points},
         {"--quiet", 'q', NULL, "no progress on stderr", NULL, &a->quiet},
@@ -123,11 +126,6 @@ static enum cli_parse parse_arguments(int argc, char **argv, struct arguments *a
     if (!read_numbers(&usage, jobs, shard, a)) return CLI_BAD_USAGE;
     const bool to_file = a->output != NULL && strcmp(a->output, "-") != 0;
     return a->points || to_file ? CLI_RUN : study_lacks(&usage, "--output with a file's name");
-}
-
-static bool in_shard(const struct study *s, size_t row)
-{
-    return row % s->arguments->shards == s->arguments->shard;
 }
 
 static void count_row(struct study *s, const char *text)
@@ -302,13 +300,13 @@ static enum ischia_code work_through(struct study *s, struct ischia_error *err)
 static bool is_unsolved(void *context, size_t row)
 {
     const struct study *s = context;
-    return in_shard(s, row) && s->journal.text[row] == NULL;
+    return s->mine[row] && s->journal.text[row] == NULL;
 }
 
 static void count_finished(struct study *s)
 {
     for (size_t row = 0; row < s->plan.points.count; row++) {
-        if (!in_shard(s, row)) continue;
+        if (!s->mine[row]) continue;
         s->total++;
         if (s->journal.text[row] != NULL) count_row(s, s->journal.text[row]);
     }
@@ -320,7 +318,7 @@ static enum ischia_code write_result(struct study *s, struct ischia_error *err)
     text_out_init(&out);
     study_plan_put_header(&out, &s->plan);
     for (size_t row = 0; row < s->plan.points.count; row++) {
-        if (!in_shard(s, row)) continue;
+        if (!s->mine[row]) continue;
         study_plan_put_inputs(&out, &s->plan, row);
         text_put_string(&out, s->journal.text[row]);
         text_put_string(&out, "\n");
@@ -332,9 +330,6 @@ static enum ischia_code solve_rows(struct study *s, struct ischia_error *err)
 {
     count_finished(s);
     start_progress(s);
-    s->died = calloc(s->plan.points.count + 1, sizeof *s->died);
-    CHECK(s->died != NULL, err, ISCHIA_E_MEMORY, "out of memory for %zu rows",
-          s->plan.points.count);
     TRY(study_sides_init(&s->sides, &s->plan.design, &s->plan.points, is_unsolved, s, err));
     if (s->done < s->total) {
         TRY(crew_start(&s->crew, s->arguments->jobs, err));
@@ -357,7 +352,6 @@ static enum ischia_code run_study(struct study *s, struct ischia_error *err)
     const enum ischia_code code = solve_rows(s, err);
     study_journal_close(&s->journal);
     study_sides_finish(&s->sides);
-    free(s->died);
     return code;
 }
 
@@ -369,11 +363,22 @@ static enum ischia_code write_points(struct study *s, struct ischia_error *err)
     s->plan.response_count = 0;
     study_plan_put_header(&out, &s->plan);
     for (size_t row = 0; row < s->plan.points.count; row++) {
-        if (!in_shard(s, row)) continue;
+        if (!s->mine[row]) continue;
         study_plan_put_inputs(&out, &s->plan, row);
         text_put_string(&out, ",\n");
     }
     return study_write(&out, s->arguments->output, err);
+}
+
+static enum ischia_code run(struct study *s, struct ischia_error *err)
+{
+    const struct arguments *a = s->arguments;
+    const size_t rows = s->plan.points.count;
+    s->mine = calloc(rows + 1, sizeof *s->mine);
+    s->died = calloc(rows + 1, sizeof *s->died);
+    CHECK(s->mine && s->died, err, ISCHIA_E_MEMORY, "out of memory for %zu rows", rows);
+    TRY(study_sides_deal(&s->plan.design, &s->plan.points, a->shard, a->shards, s->mine, err));
+    return a->points ? write_points(s, err) : run_study(s, err);
 }
 
 static int report(const struct study *s)
@@ -394,7 +399,9 @@ int study_factorial(int argc, char **argv)
     enum ischia_code code =
         study_load_plan(&study.plan, arguments.design, &arguments.defaults, &err);
     if (code == ISCHIA_OK) {
-        code = arguments.points ? write_points(&study, &err) : run_study(&study, &err);
+        code = run(&study, &err);
+        free(study.mine);
+        free(study.died);
         study_plan_finish(&study.plan);
     }
     return code == ISCHIA_OK ? report(&study) : study_failed("factorial", &err);

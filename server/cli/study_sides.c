@@ -80,6 +80,24 @@ void study_sides_finish(struct study_sides *sides)
     *sides = (struct study_sides){0};
 }
 
+static bool every_row(void *context, size_t row)
+{
+    (void)context;
+    (void)row;
+    return true;
+}
+
+enum ischia_code study_sides_deal(const struct design *design, const struct design_points *points,
+                                  size_t shard, size_t shards, bool *ret_mine,
+                                  struct ischia_error *err)
+{
+    struct study_sides all;
+    TRY(study_sides_init(&all, design, points, every_row, NULL, err));
+    for (size_t i = 0; i < all.count; i++) ret_mine[all.row[i]] = all.side[i] % shards == shard;
+    study_sides_finish(&all);
+    return ISCHIA_OK;
+}
+
 size_t study_sides_end(const struct study_sides *sides, size_t from)
 {
     size_t end = from;

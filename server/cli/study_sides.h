@@ -26,6 +26,14 @@ study_sides_init(struct study_sides *ret, const struct design *design,
                  void *context, struct ischia_error *err);
 void study_sides_finish(struct study_sides *sides); /* a zeroed one is allowed */
 
+/*
+ * ret_mine[points->count]: true for the rows of every `shards`-th side from side `shard` (0 ...
+ * shards - 1) on. Each row is in one shard, and no side is in two. ISCHIA_E_MEMORY.
+ */
+ISCHIA_MUST_CHECK enum ischia_code
+study_sides_deal(const struct design *design, const struct design_points *points, size_t shard,
+                 size_t shards, bool *ret_mine, struct ischia_error *err);
+
 /* Where the side that `from` (0 ... count) is in ends: count, or the first of another. */
 size_t study_sides_end(const struct study_sides *sides, size_t from);
 

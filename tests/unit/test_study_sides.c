@@ -73,11 +73,27 @@ static void rows_that_are_there_are_left_out(void **state)
     design_points_finish(&p);
 }
 
+static void a_shard_has_whole_sides(void **state)
+{
+    (void)state;
+    static const bool first[] = {true, false, true, false, true, false};
+    const struct design d = two_sides();
+    struct design_points p;
+    bool mine[6];
+    assert_int_equal(design_points_init(&p, &d, DESIGN_ROWS_MAX, NULL), ISCHIA_OK);
+    assert_int_equal(study_sides_deal(&d, &p, 0, 2, mine, NULL), ISCHIA_OK);
+    assert_memory_equal(mine, first, sizeof first);
+    assert_int_equal(study_sides_deal(&d, &p, 1, 2, mine, NULL), ISCHIA_OK);
+    for (int row = 0; row < 6; row++) assert_true(mine[row] != first[row]);
+    design_points_finish(&p);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_of_a_side_stay_together_forces_rising),
         cmocka_unit_test(rows_that_are_there_are_left_out),
+        cmocka_unit_test(a_shard_has_whole_sides),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
