@@ -30,8 +30,7 @@ static const double small_force_N = 7.5;
 static const double small_work_N = 0.75;
 static const double small_most = 20;
 /* A step that loses a larger share of the work than this, though it converged, has left the branch
- * of equilibria that the path is on: it is undone and halved. A step that is too short to leave a
- * branch that goes on, and loses as much nevertheless, has snapped. */
+ * of equilibria that the path is on: it is undone and halved. */
 static const double lost_share_max = 1e-3;
 /* How much more force a step may bring than its tangent says. */
 static const double stiffening = 1.5;
@@ -51,7 +50,6 @@ struct path_point {
     double work_Nmm;       /* of the seat   */
     double stored_Nmm;     /* elastic energy, and that of the sticking springs */
     double friction_Nmm;   /* dissipated     */
-    double released_Nmm;   /* in snaps       */
 };
 
 struct path {
@@ -171,8 +169,7 @@ static double work_of_step(const struct path_point *last, const struct path_poin
 static enum ischia_code weigh(struct path *p, struct path_point *ret, struct ischia_error *err)
 {
     const double(*u)[3] = (const double(*)[3])p->state->u_mm;
-    struct path_point now = {
-        .d_mm = p->state->d_mm, .force_N = p->state->force_N, .released_Nmm = p->last.released_Nmm};
+    struct path_point now = {.d_mm = p->state->d_mm, .force_N = p->state->force_N};
     TRY(newton_tangent(p->newton, p->state, &p->ahead, err));
     now.stiffness_N_mm = p->ahead.stiffness_N_mm;
     now.work_Nmm = p->last.work_Nmm + work_of_step(&p->last, &now);
@@ -182,23 +179,19 @@ static enum ischia_code weigh(struct path *p, struct path_point *ret, struct isc
     return ISCHIA_OK;
 }
 
-/* Work of a step that is neither stored, nor dissipated by friction, nor set free in a snap. */
+/* Work of a step that is neither stored nor dissipated by friction. */
 static double lost_Nmm(const struct path_point *last, const struct path_point *now)
 {
     return now->work_Nmm - last->work_Nmm - (now->stored_Nmm - last->stored_Nmm) -
-           (now->friction_Nmm - last->friction_Nmm) - (now->released_Nmm - last->released_Nmm);
+           (now->friction_Nmm - last->friction_Nmm);
 }
 
-/* True when a converged step is one of the path: it loses nothing, or has snapped. The first has no
- * work to compare with yet. */
-static bool settle(const struct path *p, struct path_point *now)
+/* The first step has no work to compare with yet, and a real snap loses energy at any length. */
+static bool stays_on_branch(const struct path *p, const struct path_point *now)
 {
     const double scale_Nmm = error_scale(now->work_Nmm, small_work_N * p->height_mm);
-    const double lost = lost_Nmm(&p->last, now);
-    if (p->report->load_steps == 0 || fabs(lost) <= lost_share_max * scale_Nmm) return true;
-    if (now->d_mm - p->last.d_mm > snap_step * p->height_mm) return false;
-    now->released_Nmm += fmax(0, lost);
-    return true;
+    return p->report->load_steps == 0 || now->d_mm - p->last.d_mm <= snap_step * p->height_mm ||
+           fabs(lost_Nmm(&p->last, now)) <= lost_share_max * scale_Nmm;
 }
 
 /* Tells of a converged step. */
@@ -311,7 +304,7 @@ static enum ischia_code follow(struct path *p, struct path_point *ret, struct is
         if (!step.final) p->tries++;
         TRY(try_step(p, &step, &newton, err));
         if (newton.reason > 0) TRY(weigh(p, ret, err));
-        if (newton.reason > 0 && settle(p, ret)) {
+        if (newton.reason > 0 && stays_on_branch(p, ret)) {
             TRY(tell(p, ret, err));
             if (step.final) return ISCHIA_OK;
             book(p, ret);
@@ -372,7 +365,6 @@ enum ischia_code path_press(struct path *p, double force_N, const struct path_ob
         TRY(start(p, err));
     TRY(follow(p, &end, err));
     report.energy_residual = lost_Nmm(&rest, &end) / end.work_Nmm;
-    report.released_share = end.released_Nmm / end.work_Nmm;
     *ret_report = report;
     return ISCHIA_OK;
 }

@@ -9,15 +9,8 @@
  * is taken under force control, so that the force is met exactly.
  */
 
-/*
- * Soft tissue beside the bone snaps: an equilibrium ends, and the next one has less energy at the
- * same place of the bone. What is set free there (in flesh it becomes heat and motion) is neither
- * stored nor friction. It is taken from steps that are too short to have lost it otherwise, and
- * reported (docs/decisions/0021-snaps-release-energy.md).
- *
- * Where the tissue folds, which fold it takes depends on the steps: a path that ends short at one
- * pace may arrive at another.
- */
+/* Where the tissue folds, which fold it takes depends on the steps: a path that ends short at one
+ * pace may arrive at another. */
 struct path_effort {
     double pace;            /* length of the steps over the usual one, (0, 1]      */
     int factorisations_max; /* a path that takes more than these has lost its way  */
@@ -29,8 +22,7 @@ struct path_report {
     int newton_iterations;
     int factorisations;
     double force_residual;  /* relative, of the last step                                   */
-    double energy_residual; /* relative: (work - stored - friction - released) / work       */
-    double released_share;  /* of the work, set free where the tissue snapped               */
+    double energy_residual; /* relative: (work - stored - friction) / work                  */
     double last_force_N;    /* largest force at which a step converged                      */
     const char *tried;      /* when not converged: what was tried, static storage           */
 };

@@ -15,8 +15,6 @@
 
 /* What a result must pass to be called converged. */
 static const double energy_residual_max = 5e-3;
-/* A path that sets free more of its work than this in snaps is not the path of slow sitting. */
-static const double released_share_max = 5e-2;
 
 /* eps_max is taken to be off by this share of the bracket of its two readings, and by this share of
  * itself for what the bracket does not see: how far the bone travels, which converges more slowly
@@ -34,13 +32,12 @@ static const struct attempt {
     double corner_share;
     struct path_effort effort;
 } attempts[] = {
-    {0.4, {.pace = 1, .factorisations_max = 200}},
-    {0.7, {.pace = 0.4, .factorisations_max = 1400}},
-    {0.55, {.pace = 0.5, .factorisations_max = 1400}},
-    {0.85, {.pace = 0.5, .factorisations_max = 1400}},
+    {0.4, {.pace = 1, .factorisations_max = 200}},   {0.7, {.pace = 1, .factorisations_max = 400}},
+    {1, {.pace = 1, .factorisations_max = 700}},     {0.85, {.pace = 1, .factorisations_max = 700}},
+    {0.7, {.pace = 0.6, .factorisations_max = 900}},
 };
 static const char *const attempts_tried =
-    "the corners weighing 0.4, 0.7, 0.55 and 0.85, the last three in steps of half the length";
+    "the corners weighing 0.4, 0.7, 1 and 0.85, and 0.7 in steps of 0.6 of the length";
 enum { ATTEMPT_COUNT = sizeof attempts / sizeof attempts[0] };
 
 struct ischia_solver {
@@ -84,8 +81,7 @@ struct solve {
 
 static bool is_sound(const struct path_report *report)
 {
-    return report->reason > 0 && fabs(report->energy_residual) <= energy_residual_max &&
-           report->released_share <= released_share_max;
+    return report->reason > 0 && fabs(report->energy_residual) <= energy_residual_max;
 }
 
 /* What an attempt made. */
@@ -249,24 +245,10 @@ static void judge(struct solve *s)
     if (!(n->det_F_min > 0) || !is_sound(&s->report)) {
         n->reason = ISCHIA_DIVERGED_CHECKS;
         (void)snprintf(n->detail, sizeof n->detail,
-                       "det F is %.3g at the least (> 0 wanted), the energy balance off by %.2g "
-                       "(at most %g), set free in snaps %.2g (at most %g)",
-                       n->det_F_min, n->energy_residual, energy_residual_max,
-                       s->report.released_share, released_share_max);
+                       "det F is %.3g at the least (> 0 wanted), the energy balance is off by %.2g "
+                       "(at most %g)",
+                       n->det_F_min, n->energy_residual, energy_residual_max);
     }
-}
-
-/* What is unusual about how a side was solved. */
-static void describe(const struct solve *s, char *ret, size_t size)
-{
-    char rule[80] = "", snaps[80] = "";
-    if (s->attempt > 0)
-        (void)snprintf(rule, sizeof rule, "solved with the corners of elements weighing %g, not %g",
-                       attempts[s->attempt].corner_share, attempts[0].corner_share);
-    if (s->report.released_share > 0)
-        (void)snprintf(snaps, sizeof snaps, "the tissue snapped and set free %.2g %% of the work",
-                       100 * s->report.released_share);
-    (void)snprintf(ret, size, "%s%s%s", rule, *rule && *snaps ? "; " : "", snaps);
 }
 
 static void take_reports(struct solve *s)
@@ -283,7 +265,10 @@ static void take_reports(struct solve *s)
     n->newton_iterations = report->newton_iterations;
     n->factorisations = report->factorisations;
     (void)snprintf(n->detail, sizeof n->detail, "%s", report->tried);
-    if (is_sound(report)) describe(s, n->detail, sizeof n->detail);
+    if (is_sound(report) && s->attempt > 0)
+        (void)snprintf(n->detail, sizeof n->detail,
+                       "solved with the corners of elements weighing %g, not %g",
+                       attempts[s->attempt].corner_share, attempts[0].corner_share);
 }
 
 static enum ischia_code keep_field(const struct solve *s, struct ischia_field *ret,

@@ -8,7 +8,6 @@
 #include "solver/units.h"
 
 static const double energy_residual_max = 5e-3;
-static const double released_share_max = 5e-2;
 static const struct path_effort effort = {.pace = 1, .factorisations_max = 2500};
 
 static const struct side sides[] = {
@@ -88,6 +87,5 @@ enum ischia_code solve_on(const struct mesh_divisions *divisions, const struct i
 
 bool is_sound(const struct outcome *o)
 {
-    return o->path.reason > 0 && o->path.released_share <= released_share_max &&
-           fabs(o->path.energy_residual) <= energy_residual_max;
+    return o->path.reason > 0 && fabs(o->path.energy_residual) <= energy_residual_max;
 }

@@ -92,21 +92,8 @@ class Quick(unittest.TestCase):
         said = [numerics["detail"] for numerics in found if numerics["detail"] is not None]
         self.assertGreater(len(said), 0)
         for detail in said:
-            self.assertRegex(detail, r"^solved with the corners .* weighing [0-9.]+, not 0.4($|;)")
+            self.assertRegex(detail, r"^solved with the corners .* weighing [0-9.]+, not 0.4$")
         self.assertIsNone(solve(table2()["1R"], resolution="coarse")["numerics"]["detail"])
-
-    def test_a_snap_is_in_the_energy_balance_and_said(self):
-        """Softest muscle under a sharp bone, on the coarse mesh: the fold beside the bone snaps. One of
-        them is enough, as above."""
-        sides = ((5, 15, 39, 22, 1, 5.4, 428), (5, 39, 29, 35, 1, 8, 428))
-        found = [solve(dict(zip(KEYS, s)), resolution="coarse")["numerics"] for s in sides]
-        for numerics in found:
-            self.assertTrue(numerics["converged"])
-            self.assertLessEqual(abs(numerics["energy_residual"]), 0.005)
-        said = [n["detail"] for n in found if "snapped" in (n["detail"] or "")]
-        self.assertGreater(len(said), 0)
-        for detail in said:
-            self.assertRegex(detail, r"the tissue snapped and set free [0-9.]+ % of the work$")
 
     def test_strain_and_travel_grow_with_the_force(self):
         results = [solve({**table2()["1R"], "F": F}) for F in (50, 100, 196)]
