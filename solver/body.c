@@ -234,6 +234,17 @@ void body_reset_pressure(struct body *body, const double (*u)[3])
     }
 }
 
+void body_shear_of_nodes(const struct body *body, double *ret_Nmm)
+{
+    const struct mesh *mesh = body->mesh;
+    memset(ret_Nmm, 0, sizeof *ret_Nmm * (size_t)mesh->node_count);
+    for (int e = 0; e < mesh->element_count; e++) {
+        const double volume_mm3 = body->batch[e / BATCH].volume[e % BATCH];
+        const double share_Nmm = body->material[mesh->tissue[e]].mu_MPa * volume_mm3 / HEX_NODES;
+        for (int k = 0; k < HEX_NODES; k++) ret_Nmm[mesh->hex[e][k]] += share_Nmm;
+    }
+}
+
 double body_det_F_min(const struct body *body, const double (*u)[3])
 {
     double smallest = HUGE_VAL;

@@ -59,6 +59,10 @@ void body_track_pressure(struct body *body, double alpha, const double (*from_mm
 /* Sets the tracked pressures to the true ones at u. */
 void body_reset_pressure(struct body *body, const double (*u_mm)[3]);
 
+/* Shear modulus times volume of what belongs to each node, an eighth of every element at it, to
+ * ret[node], N mm. */
+void body_shear_of_nodes(const struct body *body, double *ret_Nmm);
+
 /* Smallest det F over all integration points. */
 double body_det_F_min(const struct body *body, const double (*u_mm)[3]);
 

@@ -180,13 +180,39 @@ static void hold_other_nodes(struct newton *w)
     }
 }
 
-/* Energy, elastic gradient and Hessian at u, and friction for the tracked contact forces. */
+static double drag_energy(const struct newton *w, const double (*u)[3],
+                          const struct newton_drag *drag)
+{
+    double sum = 0;
+    if (drag == NULL) return 0;
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        for (int c = 0; c < 3; c++)
+            if (w->assembly->equation[n][c] >= 0)
+                sum += drag->spring_N_mm[n] / 2 * pow(u[n][c] - drag->from_mm[n][c], 2);
+    return sum;
+}
+
+static void add_drag(struct newton *w, const double (*u)[3], const struct newton_drag *drag)
+{
+    double *values = linear_values(w->assembly->linear);
+    if (drag == NULL) return;
+    for (int n = 0; n < w->body->mesh->node_count; n++)
+        for (int c = 0; c < 3; c++) {
+            if (w->assembly->equation[n][c] < 0) continue;
+            w->force[n][c] += drag->spring_N_mm[n] * (u[n][c] - drag->from_mm[n][c]);
+            values[w->assembly->diagonal[n][c]] += drag->spring_N_mm[n];
+        }
+}
+
+/* Energy, its gradient and Hessian at u, those of drag and friction too, the latter for the tracked
+ * contact forces. */
 static void linearise(struct newton *w, const double (*u)[3], double convexity,
                       const struct newton_control *control)
 {
     struct body_derivatives d = {.force = w->force, .border = w->border};
     w->elastic_Nmm = body_linearise(w->body, w->assembly, u, convexity, &d);
     w->corner = d.corner;
+    add_drag(w, u, control->drag);
     w->reaction_N = bone_reaction_N(w);
     find_gradient_normals(w, u);
     hold_other_nodes(w);
@@ -354,7 +380,7 @@ static double potential(const struct newton *w, const double (*u)[3], double d_m
                         const struct newton_control *control, double elastic_Nmm)
 {
     if (elastic_Nmm == HUGE_VAL) return HUGE_VAL;
-    return elastic_Nmm + seat_energy(w->seat, u) -
+    return elastic_Nmm + seat_energy(w->seat, u) + drag_energy(w, u, control->drag) -
            (control->force_controlled ? control->force_N * d_mm : 0);
 }
 

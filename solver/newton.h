@@ -23,11 +23,18 @@ struct equilibrium { /* the state of a body on its seat */
     double elastic_Nmm;
 };
 
+/* Springs between every free node and where it was: a step in time against drag (snap.h). */
+struct newton_drag {
+    const double *spring_N_mm;  /* [node] */
+    const double (*from_mm)[3]; /* [node] */
+};
+
 struct newton_control {
     bool force_controlled;
     double force_N;   /* quarter model's: the target, and the scale of the residual */
     double tolerance; /* |residual| / force_N                                       */
     int iterations_max;
+    const struct newton_drag *drag; /* NULL: none; else its energy counts in the minimum */
 };
 
 struct newton_report {

@@ -14,6 +14,8 @@
 struct path_effort {
     double pace;            /* length of the steps over the usual one, (0, 1]      */
     int factorisations_max; /* a path that takes more than these has lost its way  */
+    bool slow_motion;       /* snaps are followed, and what they release is measured (snap.h);
+                               else a short step may lose energy, and the balance tells */
 };
 
 struct path_report {
@@ -22,7 +24,8 @@ struct path_report {
     int newton_iterations;
     int factorisations;
     double force_residual;  /* relative, of the last step                                   */
-    double energy_residual; /* relative: (work - stored - friction) / work                  */
+    double energy_residual; /* relative: (work - stored - friction - released) / work       */
+    double released;        /* in snaps, by the work of drag; relative to the work          */
     double last_force_N;    /* largest force at which a step converged                      */
     const char *tried;      /* when not converged: what was tried, static storage           */
 };

@@ -32,12 +32,17 @@ static const struct attempt {
     double corner_share;
     struct path_effort effort;
 } attempts[] = {
-    {0.4, {.pace = 1, .factorisations_max = 200}},   {0.7, {.pace = 1, .factorisations_max = 400}},
-    {1, {.pace = 1, .factorisations_max = 700}},     {0.85, {.pace = 1, .factorisations_max = 700}},
+    {0.4, {.pace = 1, .factorisations_max = 200}},
+    {0.7, {.pace = 1, .factorisations_max = 400}},
+    {1, {.pace = 1, .factorisations_max = 700}},
+    {0.85, {.pace = 1, .factorisations_max = 700}},
     {0.7, {.pace = 0.6, .factorisations_max = 900}},
+    {0.7, {.pace = 0.4, .factorisations_max = 2500, .slow_motion = true}},
+    {0.85, {.pace = 0.4, .factorisations_max = 2500, .slow_motion = true}},
 };
 static const char *const attempts_tried =
-    "the corners weighing 0.4, 0.7, 1 and 0.85, and 0.7 in steps of 0.6 of the length";
+    "the corners weighing 0.4, 0.7, 1 and 0.85, 0.7 in steps of 0.6 of the length, 0.7 and 0.85 in "
+    "steps of 0.4 with snaps in slow motion";
 enum { ATTEMPT_COUNT = sizeof attempts / sizeof attempts[0] };
 
 struct ischia_solver {
@@ -251,6 +256,17 @@ static void judge(struct solve *s)
     }
 }
 
+/* What a result says of an attempt that was not the first. */
+static void tell_attempt(const struct solve *s, char *ret_text, size_t size)
+{
+    char snaps[80] = "";
+    if (s->report.released > 0)
+        (void)snprintf(snaps, sizeof snaps, "; snaps in slow motion released %.2g %% of the work",
+                       100 * s->report.released);
+    (void)snprintf(ret_text, size, "solved with the corners of elements weighing %g, not %g%s",
+                   attempts[s->attempt].corner_share, attempts[0].corner_share, snaps);
+}
+
 static void take_reports(struct solve *s)
 {
     struct ischia_numerics *n = &s->result.numerics;
@@ -265,10 +281,7 @@ static void take_reports(struct solve *s)
     n->newton_iterations = report->newton_iterations;
     n->factorisations = report->factorisations;
     (void)snprintf(n->detail, sizeof n->detail, "%s", report->tried);
-    if (is_sound(report) && s->attempt > 0)
-        (void)snprintf(n->detail, sizeof n->detail,
-                       "solved with the corners of elements weighing %g, not %g",
-                       attempts[s->attempt].corner_share, attempts[0].corner_share);
+    if (is_sound(report) && s->attempt > 0) tell_attempt(s, n->detail, sizeof n->detail);
 }
 
 static enum ischia_code keep_field(const struct solve *s, struct ischia_field *ret,
