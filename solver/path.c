@@ -151,11 +151,12 @@ static enum ischia_code try_step(struct path *p, const struct step *step,
 
 /* A step that leaves for the target leaves the way of larger forces; where it does not arrive,
  * steps are halved that a larger force would have taken whole. */
-static void keep_way(struct path *p, const struct step *step, bool first)
+static void keep_way(struct path *p, const struct step *step)
 {
     if (!step->final) return;
-    p->serves_larger = first;
-    if (first) p->on_way = *p->report;
+    p->serves_larger = !p->report->left;
+    if (p->serves_larger) p->on_way = *p->report;
+    p->report->left = true;
 }
 
 static bool may_go_on(const struct path *p)
@@ -218,13 +219,11 @@ static void halve(struct path *p, const struct step *step)
 /* To the target, or as far as it goes: report->reason. *ret is the last converged step. */
 static enum ischia_code follow(struct path *p, struct track_point *ret, struct ischia_error *err)
 {
-    bool left = false;  /* a step has left for the target before */
     bool stuck = false; /* in a snap */
     while (!stuck && may_go_on(p)) {
         const struct step step = next_step(p, p->ceiling_mm);
         enum outcome outcome;
-        keep_way(p, &step, !left);
-        left = left || step.final;
+        keep_way(p, &step);
         if (!step.final) p->tries++;
         TRY(weigh_step(p, &step, &outcome, ret, err));
         if (outcome == STEP_FAILED) halve(p, &step);

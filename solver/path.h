@@ -28,6 +28,7 @@ struct path_report {
     double released;        /* in snaps, by the work of drag; relative to the work          */
     double last_force_N;    /* largest force at which a step converged                      */
     const char *tried;      /* when not converged: what was tried, static storage           */
+    bool left; /* a step was tried that ends at the force: before that, none knew of it */
 };
 
 /* Called after every converged load step, the first of them with no load; false cancels. */

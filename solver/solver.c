@@ -76,9 +76,11 @@ struct solve {
     struct seat seat;
     struct equilibrium state;
     struct assembly *assembly; /* the solver's */
-    struct path *path;         /* of the last attempt                         */
-    struct path_report report; /* of the last attempt, but the work is of all */
     int attempt;
+    struct path *path;         /* of this attempt; NULL: not begun                    */
+    struct path_report report; /* of this attempt                                     */
+    struct path_report before; /* of those given up, together: the work of them alone */
+    bool fails_larger;         /* those given up are given up with any larger force   */
     struct ischia_result result;
     int points_on_way; /* of the load curve: without the last step's */
     double fraction;   /* of the progress last reported */
@@ -278,8 +280,8 @@ static void take_reports(struct solve *s)
     n->force_residual = report->force_residual;
     n->energy_residual = report->energy_residual;
     n->last_converged_F_N = side_force_N(report->last_force_N);
-    n->newton_iterations = report->newton_iterations;
-    n->factorisations = report->factorisations;
+    n->newton_iterations = s->before.newton_iterations + report->newton_iterations;
+    n->factorisations = s->before.factorisations + report->factorisations;
     (void)snprintf(n->detail, sizeof n->detail, "%s", report->tried);
     if (is_sound(report) && s->attempt > 0) tell_attempt(s, n->detail, sizeof n->detail);
 }
@@ -315,19 +317,26 @@ static enum ischia_code begin_attempt(struct solve *s, struct ischia_error *err)
 static enum ischia_code press(struct solve *s, struct ischia_error *err)
 {
     const struct path_observer observer = {report_iteration, record_step, s};
-    const struct path_report before = s->report;
-    TRY(path_press(s->path, quarter_force_N(s->c.param[ISCHIA_F]), &observer, &s->report, err));
-    s->report.newton_iterations += before.newton_iterations;
-    s->report.factorisations += before.factorisations;
-    return ISCHIA_OK;
+    return path_press(s->path, quarter_force_N(s->c.param[ISCHIA_F]), &observer, &s->report, err);
+}
+
+/* Steps that have not left for the force are those of any larger one, and so is their failure. */
+static void give_up(struct solve *s)
+{
+    s->before.newton_iterations += s->report.newton_iterations;
+    s->before.factorisations += s->report.factorisations;
+    s->fails_larger = s->fails_larger && !s->report.left;
+    leave_attempt(s);
+    s->attempt++;
 }
 
 static enum ischia_code solve_attempts(struct solve *s, struct ischia_error *err)
 {
-    for (; s->attempt < ATTEMPT_COUNT; s->attempt++) {
-        if (s->path == NULL || s->attempt > 0) TRY(begin_attempt(s, err));
+    for (;; give_up(s)) {
+        if (s->path == NULL) TRY(begin_attempt(s, err));
         TRY(press(s, err));
         if (is_sound(&s->report)) return ISCHIA_OK;
+        if (s->attempt + 1 == ATTEMPT_COUNT) break;
     }
     s->report.tried = attempts_tried;
     return ISCHIA_OK;
@@ -358,12 +367,11 @@ static bool is_same_side(const struct ischia_case *a, const struct ischia_case *
 /* Takes up the last solve where its path serves the case's force: the same bits, with less work. */
 static bool takes_up(struct solve *last, const struct ischia_case *c)
 {
-    if (last == NULL || last->attempt > 0 || !is_same_side(&last->c, c) ||
+    if (last == NULL || !last->fails_larger || !is_same_side(&last->c, c) ||
         !path_serves(last->path, quarter_force_N(c->param[ISCHIA_F])))
         return false;
     const struct ischia_result before = last->result;
     last->c = *c;
-    last->report = (struct path_report){0};
     last->fraction = 0;
     last->result = (struct ischia_result){.load_curve_count = last->points_on_way};
     memcpy(last->result.load_curve, before.load_curve, sizeof before.load_curve);
@@ -379,6 +387,7 @@ static enum ischia_code solve_begin(struct ischia_solver *solver, const struct i
     solver->last = calloc(1, sizeof *solver->last);
     CHECK(solver->last != NULL, err, ISCHIA_E_MEMORY, "not enough memory for a solve");
     solver->last->c = *c;
+    solver->last->fails_larger = true;
     return solve_init(solver->last, solver, err);
 }
 

@@ -133,6 +133,21 @@ static void same_case_same_bits(void **state)
 
 /* --- observers -------------------------------------------------------------------------------- */
 
+static void same_bits(const struct ischia_result *a, const struct ischia_result *b)
+{
+    assert_true(ischia_result_converged(a));
+    assert_memory_equal(&a->strain, &b->strain, sizeof a->strain);
+    assert_memory_equal(a->clusters, b->clusters, sizeof a->clusters);
+    assert_memory_equal(&a->seat, &b->seat, sizeof a->seat);
+    assert_int_equal(a->load_curve_count, b->load_curve_count);
+    assert_memory_equal(a->load_curve, b->load_curve,
+                        sizeof *a->load_curve * (size_t)a->load_curve_count);
+    assert_int_equal(a->numerics.newton_iterations, b->numerics.newton_iterations);
+    assert_int_equal(a->numerics.factorisations, b->numerics.factorisations);
+    assert_true(a->numerics.energy_residual == b->numerics.energy_residual);
+    assert_string_equal(a->numerics.detail, b->numerics.detail);
+}
+
 /* Whatever was solved before: from rest, or on from a smaller force of the same side. */
 static void a_larger_force_goes_on_with_the_same_bits(void **state)
 {
@@ -147,16 +162,7 @@ static void a_larger_force_goes_on_with_the_same_bits(void **state)
             struct ischia_field field, cold_field;
             const struct ischia_result r = solve(solver, &c, &field);
             const struct ischia_result cold = solve(fresh, &c, &cold_field);
-            assert_true(ischia_result_converged(&r));
-            assert_memory_equal(&r.strain, &cold.strain, sizeof r.strain);
-            assert_memory_equal(r.clusters, cold.clusters, sizeof r.clusters);
-            assert_memory_equal(&r.seat, &cold.seat, sizeof r.seat);
-            assert_int_equal(r.load_curve_count, cold.load_curve_count);
-            assert_memory_equal(r.load_curve, cold.load_curve,
-                                sizeof *r.load_curve * (size_t)r.load_curve_count);
-            assert_int_equal(r.numerics.newton_iterations, cold.numerics.newton_iterations);
-            assert_int_equal(r.numerics.factorisations, cold.numerics.factorisations);
-            assert_true(r.numerics.energy_residual == cold.numerics.energy_residual);
+            same_bits(&r, &cold);
             assert_memory_equal(field.displacement_mm, cold_field.displacement_mm,
                                 3 * sizeof(double) * field.node_count);
             ischia_field_finish(&field);
@@ -188,6 +194,42 @@ static int calls_for(struct ischia_solver *solver, const struct ischia_case *c)
     struct ischia_result r;
     assert_int_equal(ischia_solve(solver, c, &observer, &r, NULL, NULL), ISCHIA_OK);
     return w.calls;
+}
+
+static bool count(void *context, const struct ischia_progress *p)
+{
+    assert_true(p->load_step >= 1); /* another attempt counts anew */
+    ++*(int *)context;
+    return true;
+}
+
+static int iterations_for(struct ischia_solver *solver, const struct ischia_case *c,
+                          struct ischia_result *ret)
+{
+    int calls = 0;
+    const struct ischia_observer observer = {count, &calls};
+    assert_int_equal(ischia_solve(solver, c, &observer, ret, NULL, NULL), ISCHIA_OK);
+    return calls;
+}
+
+/* A soft side whose first attempt ends below the smaller force: it is not made again. */
+static void a_later_attempt_goes_on_too(void **state)
+{
+    (void)state;
+    static const double param[ISCHIA_PARAM_COUNT] = {3, 39, 19, 35, 1, 8, 192};
+    struct ischia_solver *solver = solver_make(), *fresh = solver_make();
+    struct ischia_case c = coarse_case(0);
+    memcpy(c.param, param, sizeof param);
+    const struct ischia_result r = solve(solver, &c, NULL);
+    assert_non_null(strstr(r.numerics.detail, "corners"));
+    c.param[ISCHIA_F] = 310;
+    struct ischia_result cold, warm;
+    const int from_rest = iterations_for(fresh, &c, &cold);
+    const int on = iterations_for(solver, &c, &warm);
+    assert_in_range(on, 1, from_rest / 3);
+    same_bits(&warm, &cold);
+    ischia_solver_destroy(solver);
+    ischia_solver_destroy(fresh);
 }
 
 static void going_on_is_less_work_until_forgotten(void **state)
@@ -283,6 +325,7 @@ int main(void)
         cmocka_unit_test(field_fits_the_mesh),
         cmocka_unit_test(same_case_same_bits),
         cmocka_unit_test(a_larger_force_goes_on_with_the_same_bits),
+        cmocka_unit_test(a_later_attempt_goes_on_too),
         cmocka_unit_test(going_on_is_less_work_until_forgotten),
         cmocka_unit_test(progress_never_goes_back),
         cmocka_unit_test(cancelling_leaves_no_trace),
