@@ -44,8 +44,8 @@ static void must(enum ischia_code code, const struct ischia_error *err)
 static void pressed_make(struct pressed *p)
 {
     static const double size_mm[3] = {10, 10, 10};
-    static const struct element_material tissue = {0.005, 0.5, 0.025, 0.0005};
-    static const struct element_material material[TISSUE_COUNT] = {tissue, tissue, tissue};
+    const struct element_material tissue = {0.005, 0.5, 0.025, 0.0005};
+    const struct element_material material[TISSUE_COUNT] = {tissue, tissue, tissue};
     const struct newton_control control = {.force_N = 1, .tolerance = 1e-6, .iterations_max = 100};
     struct newton_report report;
     struct track_point now;
