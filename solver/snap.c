@@ -231,13 +231,16 @@ static enum ischia_code one_step(struct slow *w, newton_observe *observe, void *
 {
     const bool free = may_be_free(w);
     struct newton_report newton;
-    struct track_point now;
+    struct track_point now = {0};
+    bool stands = false;
     TRY(minimise(w, free, observe, context, &newton, err));
     report->newton_iterations += newton.iterations;
     report->factorisations += newton.factorisations;
-    if (newton.reason > 0) TRY(weigh(w, free, &now, err));
-    if (newton.reason < 0 ||
-        share_of_work(w, track_lost_Nmm(&w->track->last, &now)) > lost_share_max) {
+    if (newton.reason > 0) {
+        TRY(weigh(w, free, &now, err));
+        stands = share_of_work(w, track_lost_Nmm(&w->track->last, &now)) <= lost_share_max;
+    }
+    if (!stands) {
         *ret_over = !go_back(w, free);
         return ISCHIA_OK;
     }
