@@ -17,9 +17,9 @@
  * energy with springs from where the nodes are (newton.h), which is convex when the step is short.
  * Drag is a force times a way, apart from the energies, by the trapezium rule between steps: a
  * balance that counts it is still a check. c_n is the node's share of shear modulus times volume
- * over height squared; it sets the unit of time and weighs the nodes. The last step is without drag, so that the
- * equilibrium is the model's own. (A viscous regularisation, as programs for structures offer it
- * for whole analyses; here within a snap only.)
+ * over height squared; it sets the unit of time and weighs the nodes. The last step is without
+ * drag, so that the equilibrium is the model's own. (A viscous regularisation, as programs for
+ * structures offer it for whole analyses; here within a snap only.)
  */
 struct snap;
 
