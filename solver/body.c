@@ -124,9 +124,9 @@ static void scatter(const struct part *part, int e, const struct mesh *mesh,
 {
     int eq[HEX_DOFS];
     scatter_force(part, mesh->hex[e], ret->force);
-    scatter_stiffness(part, a->scatter[e], linear_values(a->linear));
+    scatter_stiffness(part, assembly_element_scatter(a, e), linear_values(a->linear));
     if (!touches_bone(mesh, e)) return;
-    assembly_element_equations(a, mesh->hex[e], eq);
+    assembly_element_equations(a, mesh->hex[e], HEX_NODES, eq);
     scatter_bone(part, eq, ret);
 }
 

@@ -43,7 +43,7 @@ TRAINING = tuple(
     Run(f"{name}_default", title, ("study", "factorial", f"examples/design_{name}.json"))
     for name, title in (
         ("training", "1024 points between those of Table 1, for the emulator"),
-        ("training_wide", "1024 points in a wider box, for the emulator"),
+        ("training_wide", "512 points in a wider box, for the emulator"),
     )
 )
 

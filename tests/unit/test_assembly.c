@@ -64,10 +64,11 @@ static void scatter_all(const struct assembly *a, const struct mesh *mesh, doubl
     linear_clear(a->linear);
     for (int e = 0; e < mesh->element_count; e++) {
         int eq[HEX_DOFS];
-        assembly_element_equations(a, mesh->hex[e], eq);
+        const int *scatter = assembly_element_scatter(a, e);
+        assembly_element_equations(a, mesh->hex[e], HEX_NODES, eq);
         for (int p = 0, k = 0; p < HEX_DOFS; p++)
             for (int q = 0; q <= p; q++, k++) {
-                const int place = a->scatter[e][k];
+                const int place = scatter[k];
                 assert_true((place >= 0) == (eq[p] >= 0 && eq[q] >= 0));
                 if (place < 0) continue;
                 values[place] += element_entry(e, p, q);
