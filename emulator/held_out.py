@@ -26,6 +26,7 @@ TABLE1 = {
     "muF": (2.8, 8),
     "F": (192, 428),
 }
+FIRM_KPA = 2.5  # muscle that folds in hardly any solve
 
 
 def load(path):
@@ -93,11 +94,14 @@ def test_output(emulator, output, trained, fresh):
         return None
     y = np.array([float(r[name]) for r in rows])
     value, low, high = emulator.predict(output, rows)
+    firm = np.array([float(r["muM"]) >= FIRM_KPA for r in rows])
     base = polynomial(name, inside(trained, TABLE1), rows, TABLE1) - y
     return {
         "output": name,
         "points": len(y),
         "rms": rms(value - y),
+        "firm_points": int(firm.sum()),
+        "firm_rms": rms((value - y)[firm]),
         "median": float(np.median(np.abs(value - y))),
         "largest": float(np.max(np.abs(value - y))),
         "in_band": float(np.mean((low <= y) & (y <= high))),
