@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Quantiles of a person whose measurements are uncertain, by brute force: a full solve for each of
-some hundred samples; beside them what `ischia solve` says by the emulator. Resumable: solves are
+some thousand samples; beside them what `ischia solve` says by the emulator. Resumable: solves are
 kept in blocks, and a block that is there is not made again. Needs NumPy.
 
   monte_carlo.py --program ischia --emulator emulator.txt --work DIR [-j N] [--json OUT.json]
-                 [--persons 2,right 11,left] [--samples 520] [--resolution standard] [--seed 1]
+                 [--persons 2,right 11,left] [--samples 1040] [--resolution standard] [--seed 1]
 
 The samples are drawn here anew (normal, rejected outside the limits), not by the program's own code.
 """
@@ -171,7 +171,7 @@ def main():
     parse.add_argument("--emulator", type=pathlib.Path, required=True)
     parse.add_argument("--work", type=pathlib.Path, required=True)
     parse.add_argument("--persons", nargs="+", default=["2,right", "11,left"])
-    parse.add_argument("--samples", type=int, default=520)
+    parse.add_argument("--samples", type=int, default=1040)
     parse.add_argument("--resolution", default="standard")
     parse.add_argument("--seed", type=int, default=1)
     parse.add_argument("-j", "--jobs", type=int, default=1)
