@@ -32,6 +32,7 @@ READINGS = [
     ("bulk_20", "bulk ratio 20", {"model": {"bulk_ratio": 20}}),
     ("bulk_30", "bulk ratio 30", {"model": {"bulk_ratio": 30}}),
     ("bulk_50", "bulk ratio 50", {"model": {"bulk_ratio": 50}}),
+    ("bulk_100", "bulk ratio 100", {"model": {"bulk_ratio": 100}}),
     ("bulk_200", "bulk ratio 200", {"model": {"bulk_ratio": 200}}),
     ("R2_surface", "R2 at the surface", {"model": {"R2_surface": 1}}),
     (
