@@ -90,8 +90,7 @@ static void put(struct places *p, int node, const int at[3])
     memcpy(p->of[p->count++].at, at, sizeof p->of->at);
 }
 
-/* Which way an edge of a hexahedron leads from the middle: known from its other end, or from the
- * three hexahedra before that have it too; false: not known yet. */
+/* Which way an edge of a hexahedron leads from the middle; false: its other end is not placed. */
 static bool direction_of(const struct places *p, const int hex[8], int corner, int axis, int ret[3])
 {
     const struct place *end = find(p, hex[along_edge(corner, axis)]);
@@ -100,31 +99,37 @@ static bool direction_of(const struct places *p, const int hex[8], int corner, i
     return true;
 }
 
-/* Puts the nodes of one hexahedron, two of whose three edges at the middle are placed: the third
- * leads away from the one that is placed on the same axis. */
-static bool put_hex(struct places *p, const int hex[8], int middle)
+static bool is_taken(const struct places *p, const int at[3])
+{
+    for (int i = 0; i < p->count; i++)
+        if (memcmp(p->of[i].at, at, sizeof p->of[i].at) == 0) return true;
+    return false;
+}
+
+/* The third direction from the middle, two being known: along the axis that is neither's, to the
+ * side where no node is yet. */
+static void third_direction(const struct places *p, int edge[3][3], int unknown)
+{
+    int axis = 0;
+    const int *a = edge[(unknown + 1) % 3], *b = edge[(unknown + 2) % 3];
+    while (a[axis] != 0 || b[axis] != 0) axis++;
+    memset(edge[unknown], 0, sizeof edge[unknown]);
+    edge[unknown][axis] = 1;
+    if (is_taken(p, edge[unknown])) edge[unknown][axis] = -1;
+}
+
+/* Puts the nodes of one hexahedron, if at least two of its three edges at the middle are placed. */
+static void put_hex(struct places *p, const int hex[8], int middle)
 {
     const int corner = corner_of(hex, middle);
-    int edge[3][3], unknown = -1, known_axes[3] = {0};
+    int edge[3][3], unknown = -1, unknowns = 0;
     for (int axis = 0; axis < 3; axis++)
         if (!direction_of(p, hex, corner, axis, edge[axis])) {
-            if (unknown >= 0) return false;
             unknown = axis;
+            unknowns++;
         }
-    if (unknown >= 0) {
-        for (int axis = 0; axis < 3; axis++)
-            for (int d = 0; axis != unknown && d < 3; d++) known_axes[d] |= edge[axis][d];
-        int free_axis = 0;
-        while (known_axes[free_axis] != 0) free_axis++;
-        for (int side = -1; side <= 1; side += 2) {
-            const int at[3] = {side * (free_axis == 0), side * (free_axis == 1),
-                               side * (free_axis == 2)};
-            bool used = false;
-            for (int i = 0; i < p->count; i++)
-                used = used || memcmp(p->of[i].at, at, sizeof at) == 0;
-            if (!used) memcpy(edge[unknown], at, sizeof at);
-        }
-    }
+    if (unknowns > 1) return;
+    if (unknowns == 1) third_direction(p, edge, unknown);
     for (int k = 0; k < 8; k++) {
         int at[3] = {0};
         for (int axis = 0; axis < 3; axis++)
@@ -132,7 +137,6 @@ static bool put_hex(struct places *p, const int hex[8], int middle)
                 at[d] += edge[axis][d];
         put(p, hex[k], at);
     }
-    return true;
 }
 
 /* The first hexahedron sets the axes, which makes the block's volume as positive as its own. */
@@ -162,7 +166,7 @@ static void add_block(struct search *s, int middle)
     }
     put_first(&p, mesh->hex[around[0]], middle);
     for (int round = 0; round < BLOCK_HEXES && p.count < BLOCK_NODES; round++)
-        for (int i = 1; i < BLOCK_HEXES; i++) (void)put_hex(&p, mesh->hex[around[i]], middle);
+        for (int i = 1; i < BLOCK_HEXES; i++) put_hex(&p, mesh->hex[around[i]], middle);
     s->fits = s->fits && p.count == BLOCK_NODES;
     struct block *block = &s->block[s->count];
     block->tissue = (enum tissue)mesh->tissue[around[0]];

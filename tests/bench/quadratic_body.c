@@ -24,7 +24,7 @@
 #include "solver/ogden.h"
 #include "tests/bench/blocks.h"
 
-enum { GAUSS = 27, DOFS = 3 * BLOCK_NODES, PRESSURES = 4, ENTRIES = DOFS * (DOFS + 1) / 2 };
+enum { GAUSS = 27, DOFS = 3 * BLOCK_NODES, PRESSURES = 4 };
 
 #if defined __x86_64__ && defined __GNUC__ && !defined __clang__
 #define WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
@@ -204,14 +204,13 @@ enum ischia_code __wrap_assembly_init(struct assembly *ret, const struct mesh *m
 {
     int count = 0;
     struct block *block = blocks_of(mesh, &count);
-    int(*node)[BLOCK_NODES] = calloc((size_t)count + 1, sizeof *node);
-    enum ischia_code code = FAIL(err, ISCHIA_E_MEMORY, "no blocks of 2 x 2 x 2 elements");
-    if (block != NULL && node != NULL) {
-        for (int e = 0; e < count; e++) memcpy(node[e], block[e].node, sizeof node[e]);
-        const struct connectivity c = {count, BLOCK_NODES, &node[0][0]};
-        code = assembly_init_elements(ret, mesh, &c, err);
-    }
+    CHECK(block != NULL, err, ISCHIA_E_MEMORY, "no blocks of 2 x 2 x 2 elements");
+    int(*node)[BLOCK_NODES] = calloc((size_t)count, sizeof *node);
+    for (int e = 0; node != NULL && e < count; e++) memcpy(node[e], block[e].node, sizeof node[e]);
     free(block);
+    CHECK(node != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the elements' nodes");
+    const struct connectivity c = {count, BLOCK_NODES, &node[0][0]};
+    const enum ischia_code code = assembly_init_elements(ret, mesh, &c, err);
     free(node);
     return code;
 }

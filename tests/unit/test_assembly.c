@@ -131,6 +131,34 @@ static void places_of_a_node_are_its_own(void **state)
     box_mesh_free(&mesh);
 }
 
+/* One element of all nodes of a box of 2 x 2 x 2: all its equations act on each other. */
+static void other_elements_take_the_nodes_of_the_mesh(void **state)
+{
+    (void)state;
+    static const struct box eight = {{2, 2, 2}, {4, 4, 4}, 0, 0};
+    enum { NODES = 27, ENTRIES = 3 * NODES * (3 * NODES + 1) / 2 };
+    struct mesh mesh = box_mesh(&eight);
+    struct assembly a = {0};
+    struct ischia_error err;
+    int node[NODES], eq[3 * NODES], last = -1;
+    for (int n = 0; n < NODES; n++) node[n] = NODES - 1 - n;
+    const struct connectivity whole = {1, NODES, node};
+    assert_int_equal(mesh.node_count, NODES);
+    assert_int_equal(assembly_init_elements(&a, &mesh, &whole, &err), ISCHIA_OK);
+    assert_int_equal(a.entries, ENTRIES);
+    assembly_element_equations(&a, node, NODES, eq);
+    const int *place = assembly_element_scatter(&a, 0);
+    for (int p = 0; p < 3 * NODES; p++)
+        for (int q = 0; q <= p; q++, place++) {
+            assert_int_equal(eq[p], a.equation[node[p % NODES]][p / NODES]);
+            assert_true((*place >= 0) == (eq[p] >= 0 && eq[q] >= 0));
+            if (*place > last) last = *place;
+        }
+    assert_int_equal(last + 1, a.n * (a.n + 1) / 2);
+    assembly_finish(&a);
+    box_mesh_free(&mesh);
+}
+
 static void success_leaves_the_error_alone(void **state)
 {
     (void)state;
@@ -152,6 +180,7 @@ int main(void)
         cmocka_unit_test(equations_follow_the_flags),
         cmocka_unit_test(matrix_is_the_dense_one),
         cmocka_unit_test(places_of_a_node_are_its_own),
+        cmocka_unit_test(other_elements_take_the_nodes_of_the_mesh),
         cmocka_unit_test(success_leaves_the_error_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
