@@ -24,7 +24,8 @@ import tempfile
 
 import plots
 import runs
-from readings import READINGS
+from page_readings import compressibility, lost_runs, readings
+from readings import SUBSETS
 from words import percent, quantile, signed, solved, table, value
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -91,15 +92,16 @@ def missing(results, out):
     """Which runs the page still waits for: nothing below is made up for them."""
     rows = [[f"`{r.name}`", r.title, f"`{r.command()}`"] for r in runs.RUNS]
     rows = [row for row, r in zip(rows, runs.RUNS) if not results.has(r.name)]
-    left = [words for name, words, _ in READINGS if not results.has(f"reading_{name}")]
-    if left:
-        rows.append(
-            [
-                "`reading_…`",
-                f"{len(left)} of {len(READINGS)} readings on a subset",
-                "`readings.py --keep`",
-            ]
-        )
+    for key, subset in SUBSETS.items():
+        left = [name for name in subset.names if not results.has(f"{subset.prefix}_{name}")]
+        if left:
+            rows.append(
+                [
+                    f"`{subset.prefix}_…`",
+                    f"{len(left)} of {len(subset.names)} readings, {subset.resolution}",
+                    f"`readings.py --subset {key} --keep`",
+                ]
+            )
     if not rows:
         return ""
     return (
@@ -627,82 +629,6 @@ def emulator(results, out):
     return "## Main effects, and the polynomial against the solver\n\n" + text if text else ""
 
 
-def sign_count(fit, between=" of "):
-    beside = fit["against_published"]
-    return f"{beside['same_sign']}{between}{beside['terms']}"
-
-
-def readings(results, out):
-    rows = []
-    for name, entry in results.manifest.items():
-        if not name.startswith("reading_"):
-            continue
-        document = results.emulate(name)
-        fit = {f["degree"]: f for f in document["fits"]}
-        if 2 not in fit:
-            continue
-        order = sorted(fit[2]["parameters"], key=lambda p: -p["S_percent"])
-        rows.append((entry["title"], document, fit, " > ".join(p["key"] for p in order[:4])))
-    if not rows:
-        return ""
-    rows.sort(
-        key=lambda r: sum(r[2][d]["against_published"]["relative_distance"] for d in (1, 2))
-    )
-    (out / "readings.svg").write_text(
-        plots.reading_dots(
-            [
-                (
-                    words,
-                    fit[1]["against_published"]["relative_distance"],
-                    fit[2]["against_published"]["relative_distance"],
-                    (" and ".join(sign_count(fit[d], "/") for d in (1, 2)) + " signs"),
-                )
-                for words, _, fit, _ in rows
-            ],
-            "Relative distance to the printed coefficients: smaller is nearer",
-        )
-    )
-    body = [
-        [
-            words,
-            f"{d['rows_used']} of {d['rows']}",
-            *(f"{fit[k]['against_published']['relative_distance']:.2f}" for k in (1, 2)),
-            *(
-                f"{fit[k]['against_published']['same_sign']} of"
-                f" {fit[k]['against_published']['terms']}"
-                for k in (1, 2)
-            ),
-            *(f"{100 * fit[k]['r2']:.0f} %" for k in (1, 2)),
-            f"{fit[2]['mean_squared_residuals']:.2g}",
-            order,
-        ]
-        for words, d, fit, order in rows
-    ]
-    return (
-        "## Which reading of the paper comes nearest\n\nOne change from the default at a time, on"
-        " a subset of Table 1, fitted and compared like the full factorial. A subset at a coarser"
-        " resolution ranks readings against each other; it does not replace the full factorial"
-        " above.\n\n![Distance of each reading to the printed"
-        " tables](validation/readings.svg)\n\n"
-        + table(
-            [
-                "reading",
-                "converged",
-                "distance to Table 3",
-                "to Table 4",
-                "signs of Table 3",
-                "of Table 4",
-                "R², degree 1",
-                "degree 2",
-                "residual, degree 2",
-                "order by S, degree 2",
-            ],
-            body,
-            range(2, 9),
-        )
-    )
-
-
 def printed_check(results, out):
     """Whether the printed percentages follow from the printed coefficients: arithmetic on the
     paper alone."""
@@ -782,6 +708,8 @@ def main():
                     tables,
                     emulator,
                     readings,
+                    compressibility,
+                    lost_runs,
                     printed_check,
                     provenance,
                 )

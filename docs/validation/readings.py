@@ -4,8 +4,8 @@
 ranks the readings by their distance to the printed Tables 3 and 4. Resumable: run it again after a
 stop.
 
-  readings.py --program build/ischia --work DIR [--design DESIGN.json] [--resolution R] [-j N]
-              [--only NAME,...] [--keep]
+  readings.py --program build/ischia --work DIR [--subset coarse|standard] [-j N]
+              [--only NAME,...] [--keep] [--design DESIGN.json] [--resolution R]
 
 Distance: sqrt(sum (ours - printed)^2 / sum printed^2) over the coefficients that the table prints:
 0 is equal and 1 is as far as no effect at all. Signs: how many printed coefficients have our sign.
@@ -13,6 +13,7 @@ Distance: sqrt(sum (ours - printed)^2 / sum printed^2) over the coefficients tha
 """
 
 import argparse
+import dataclasses
 import json
 import pathlib
 import subprocess
@@ -48,6 +49,32 @@ READINGS = [
 ]
 
 
+@dataclasses.dataclass(frozen=True)
+class Subset:
+    """Points of Table 1, the resolution they are solved at, and what is to be learnt there."""
+
+    prefix: str  # of the kept files
+    design: str  # in examples/
+    resolution: str
+    degrees: tuple  # of the polynomials that the design can tell apart
+    names: tuple  # of the readings
+
+
+# Many readings cheaply, and the one that matters most as the full factorial would have it.
+SUBSETS = {
+    "coarse": Subset(
+        "reading", "design_table1_ninth.json", "coarse", (1, 2), tuple(r[0] for r in READINGS)
+    ),
+    "standard": Subset(
+        "standard",
+        "design_table1_27th.json",
+        "standard",
+        (1,),
+        ("default", "bulk_200", "bulk_100", "bulk_30"),
+    ),
+}
+
+
 def solve(a, name, options):
     design = json.loads(a.design.read_text())
     design["name"] = f"reading_{name}"
@@ -80,9 +107,11 @@ def fits(a, design, out):
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
-def summary(document):
+def summary(document, degrees):
     row = {"rows": document["rows"], "used": document["rows_used"]}
     for fit in document["fits"]:
+        if fit["degree"] not in degrees:
+            continue
         beside = fit["against_published"]
         order = sorted(fit["parameters"], key=lambda p: -p["S_percent"])
         row[fit["degree"]] = {
@@ -103,24 +132,27 @@ def main():
     parse = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parse.add_argument("--program", required=True)
     parse.add_argument("--work", type=pathlib.Path, required=True)
-    parse.add_argument(
-        "--design", type=pathlib.Path, default=ROOT / "examples/design_table1_ninth.json"
-    )
-    parse.add_argument("--resolution", default="coarse")
+    parse.add_argument("--subset", choices=SUBSETS, default="coarse")
+    parse.add_argument("--design", type=pathlib.Path, help="instead of the subset's")
+    parse.add_argument("--resolution", help="instead of the subset's")
     parse.add_argument("-j", "--jobs", type=int)
     parse.add_argument("--only", default="")
     parse.add_argument("--keep", action="store_true")
     parse.add_argument("--data", type=pathlib.Path, default=keep.DATA)
     a = parse.parse_args()
+    subset = SUBSETS[a.subset]
+    a.design = a.design or ROOT / "examples" / subset.design
+    a.resolution = a.resolution or subset.resolution
     a.work.mkdir(parents=True, exist_ok=True)
-    chosen = [r for r in READINGS if not a.only or r[0] in a.only.split(",")]
+    wanted = a.only.split(",") if a.only else subset.names
+    chosen = [r for r in READINGS if r[0] in wanted]
     rows = []
     for name, words, options in chosen:
         out = solve(a, name, options)
         if a.keep:
             said = f"readings.py --design {a.design.name} --resolution {a.resolution}"
-            keep.keep(f"reading_{name}", out, a.program, said, words, a.data)
-        rows.append((words, summary(fits(a, a.design, out))))
+            keep.keep(f"{subset.prefix}_{name}", out, a.program, said, words, a.data)
+        rows.append((words, summary(fits(a, a.design, out), subset.degrees)))
     rows.sort(
         key=lambda r: r[1][1]["relative_distance"] + r[1].get(2, r[1][1])["relative_distance"]
     )

@@ -42,14 +42,13 @@ def make(run, a):
     keep.keep(run.name, out, a.program, run.command(), run.title, a.data)
 
 
-def make_readings(a):
-    """The readings, by readings.py with its own usual subset and resolution."""
-    wanted = [name for name, _, _ in readings.READINGS]
-    missing = [n for n in wanted if not is_kept(f"reading_{n}", a.program, a.data)]
+def make_readings(a, key, subset):
+    """The readings of one subset that are not kept, by readings.py."""
+    missing = [n for n in subset.names if not is_kept(f"{subset.prefix}_{n}", a.program, a.data)]
     if not missing:
         return
     command = [sys.executable, str(HERE / "readings.py"), "--program", a.program, "--keep"]
-    command += ["--work", str(a.work / "readings"), "--data", str(a.data)]
+    command += ["--subset", key, "--work", str(a.work / f"readings_{key}"), "--data", str(a.data)]
     command += ["--only", ",".join(missing), *(["-j", str(a.jobs)] if a.jobs else [])]
     subprocess.run(command, check=True)
 
@@ -78,7 +77,8 @@ def main():
     if a.list:
         return
     if "readings" in wanted:
-        make_readings(a)
+        for key, subset in readings.SUBSETS.items():
+            make_readings(a, key, subset)
     page = [sys.executable, str(HERE / "make.py"), "--program", a.program]
     subprocess.run([*page, "--data", str(a.data), "--out", str(a.out)], check=True)
 

@@ -74,6 +74,11 @@ class Report(unittest.TestCase):
             "--data",
             cls.data,
         )
+        run(
+            *(sys.executable, VALIDATION / "readings.py", "--program", PROGRAM, "--keep"),
+            *("--subset", "standard", "--only", "bulk_100", "--work", cls.path / "work_standard"),
+            *("--data", cls.data),
+        )
 
         cls.out = cls.path / "out"
         cls.make(cls.out)
@@ -134,9 +139,24 @@ class Report(unittest.TestCase):
         missing = page.split("## What has not been run yet")[1].split("\n## ")[0]
         for name in ("cohort_as_published", "table1_as_published", "sobol_default"):
             self.assertIn(f"`{name}`", missing)
-        self.assertIn("13 of 15 readings", missing)
+        self.assertIn("13 of 15 readings, coarse", missing)
+        self.assertIn("3 of 4 readings, standard", missing)
         for name in ("cohort_default", "table1_default"):
             self.assertNotIn(f"`{name}`", missing)
+
+    def test_a_27th_has_the_main_effects_of_the_whole(self):
+        section = self.page.split("## Compressibility at standard resolution")[1].split("\n## ")[0]
+        row = next(r for r in section.splitlines() if r.startswith("| bulk ratio 100 |"))
+        cells = [c.strip() for c in row.strip("|").split("|")]
+        doubles = (-0.18, -0.16, 0.12, -0.09, 0.02, 0.02, -0.02)  # μM, R2, F, R1, eM, eF, μF
+        for theta, cell in zip(doubles, cells[2:9]):
+            self.assertAlmostEqual(float(cell.replace("−", "-")), theta, delta=0.01)
+        self.assertIn("| printed |  | −0.1770 | −0.1604 |", section)
+
+    def test_the_runs_that_the_paper_lost_are_left_out_once(self):
+        section = self.page.split("## The runs that the paper lost")[1].split("\n## ")[0]
+        self.assertIn("| default, all | 2106 | −0.18", section)
+        self.assertIn("| default, without 239 | 1948 |", section)
 
     def test_the_leading_effects_are_said(self):
         page = self.page

@@ -106,7 +106,7 @@ class Results(unittest.TestCase):
                 continue
             self.assertEqual(item['results']['eps_max'], float(row['eps_max']))
             self.assertEqual(item['model']['name'], 'as-published')
-            self.assertEqual(item['model']['bulk_ratio'], 30)
+            self.assertEqual(item['model']['bulk_ratio'], 100)
         refused = document['items'][26]
         self.assertEqual((refused['status'], refused['parameters']), ('refused', None))
         self.assertIn('R2', refused['problem']['detail'])

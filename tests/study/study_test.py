@@ -79,6 +79,7 @@ class Designs(InTemporaryFolder):
         for name, rows in (
             ("table1", 2187),
             ("table1_ninth", 243),
+            ("table1_27th", 81),
             ("table1_composite", 79),
             ("table1_sobol", 256),
             ("table1_morris", 160),
