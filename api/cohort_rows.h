@@ -7,11 +7,17 @@
 #include "api/case_doc.h"
 #include "api/csv.h"
 
+/* What columns called sd, sd.R1 ... sd.F are to the reader: like any other; the standard deviations
+ * of a row's inputs; those, and a file without a column sd has typical ones. */
+enum cohort_sd { COHORT_SD_KEPT, COHORT_SD_READ, COHORT_SD_TYPICAL };
+
 /*
  * A cohort file: a header that names the columns, then one side a row. Columns: R1 or R1_mm and so
  * on, resolution, model, and options as skin.mu or model.friction; all others are kept as they are.
  */
 struct cohort_columns {
+    enum cohort_sd sd;
+    bool has_sd; /* rows may have standard deviations, and the header the columns of an interval */
     int count;
     const char *key[CSV_COLUMNS_MAX]; /* what a column means to us, static; NULL: an extra column */
     char *header;                     /* the columns as they are written again                    */
@@ -20,7 +26,7 @@ struct cohort_columns {
 /* Reads the header row. ISCHIA_E_INPUT, and a fault for each, when a column for one of the seven is
  * missing, one is there twice, or one has the name of a result column. */
 ISCHIA_MUST_CHECK enum ischia_code
-cohort_columns_init(struct cohort_columns *ret, const struct csv_row *row,
+cohort_columns_init(struct cohort_columns *ret, const struct csv_row *row, enum cohort_sd sd,
                     struct doc_faults *faults, struct ischia_error *err);
 void cohort_columns_finish(struct cohort_columns *columns);
 

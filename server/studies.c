@@ -247,7 +247,8 @@ static enum ischia_code read_cohort(struct cohort *k, struct doc_faults *faults,
     TRY(csv_read(&k->reader, &k->row, &end, err));
     CHECK(!end, err, ISCHIA_E_INPUT, "there are no rows; the first one names the columns");
     struct ischia_error why = {0};
-    const enum ischia_code code = cohort_columns_init(&k->columns, &k->row, faults, &why);
+    const enum ischia_code code =
+        cohort_columns_init(&k->columns, &k->row, COHORT_SD_KEPT, faults, &why);
     if (faults->count > 0) return ISCHIA_OK;
     if (code != ISCHIA_OK) return FAIL(err, code, "%s", why.message);
     TRY(cells_of_row(&k->row, k->columns.count, &k->study->columns_json, err));

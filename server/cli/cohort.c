@@ -13,11 +13,13 @@
 #include "api/cohort_rows.h"
 #include "api/problem_doc.h"
 #include "api/result_csv.h"
+#include "api/uncertainty_csv.h"
 #include "server/cli/bar.h"
 #include "server/cli/crew.h"
 #include "server/cli/files.h"
 #include "server/cli/options.h"
 #include "server/cli/run.h"
+#include "server/cli/uncertain.h"
 
 enum { WINDOW = 256, REASON_BYTES = 640 };
 
@@ -35,17 +37,21 @@ struct row {
     long long end; /* where in the file it ends */
     char *echo;
     char reason[REASON_BYTES];
-    struct ischia_case c;
+    struct crew_order order;
     bool has_result;
     struct ischia_result result;
+    bool has_uncertainty;
+    struct ischia_uncertainty uncertainty;
 };
 
 struct cohort {
-    const char *path;
+    const char *path, *emulator; /* NULL: the installed one */
+    enum cohort_sd sd;
     struct case_doc_defaults defaults;
     struct cohort_columns columns;
     struct csv_reader reader;
     struct line_out out;
+    struct estimator *estimator; /* NULL: there is none, or nobody needs it */
     struct crew crew;
     struct bar bar;
     long long file_bytes; /* 0: not known               */
@@ -113,12 +119,14 @@ static enum ischia_code read_row(struct cohort *k, struct ischia_error *err)
         doc_faults_init(&faults);
         ischia_request_init(&request);
         TRY(cohort_row_read(&k->columns, &k->defaults, &csv, &row->echo, &request, &faults, err));
-        row->c = request.values;
+        row->order.c = request.values;
+        row->order.has_sd = request.has_sd;
+        case_doc_sd(&request, row->order.sd);
         if (faults.count > 0) refuse_faults(k, row, &faults);
     }
     k->next_read++;
     if (row->state == ROW_SOLVING)
-        return crew_give(&k->crew, crew_idle(&k->crew), k->next_read - 1, &row->c, err);
+        return crew_give(&k->crew, crew_idle(&k->crew), k->next_read - 1, &row->order, err);
     return ISCHIA_OK;
 }
 
@@ -130,6 +138,8 @@ static void take_answer(struct cohort *k, const struct crew_answer *answer)
     struct problem problem;
     row->has_result = answer->code == ISCHIA_OK;
     row->result = answer->result;
+    row->has_uncertainty = answer->has_uncertainty;
+    row->uncertainty = answer->uncertainty;
     row->state = ROW_FAILED;
     if (!row->has_result) {
         (void)snprintf(row->reason, sizeof row->reason, "%s", answer->message);
@@ -137,7 +147,7 @@ static void take_answer(struct cohort *k, const struct crew_answer *answer)
         row->state = ROW_SUCCEEDED;
         return;
     } else {
-        problem_from_result(&problem, &row->c, &answer->result);
+        problem_from_result(&problem, &row->order.c, &answer->result);
         (void)snprintf(row->reason, sizeof row->reason, "%s: %s", problem.reason, problem.detail);
     }
     say_line(k, row->line, row->reason);
@@ -154,6 +164,8 @@ static enum ischia_code write_row(struct cohort *k, struct row *row, struct isch
     text_put_string(&line, row->echo);
     result_csv_put(&line, row_state_names[row->state], row->reason,
                    row->has_result ? &row->result : NULL, false);
+    if (k->columns.has_sd)
+        uncertainty_csv_put(&line, row->has_uncertainty ? &row->uncertainty : NULL);
     csv_end_row(&line);
     TRY(text_out_take(&line, &text, &length, err));
     const enum ischia_code code = line_out_write(&k->out, text, length, err);
@@ -212,7 +224,7 @@ static enum ischia_code solve_rows(struct cohort *k, struct ischia_error *err)
 static enum ischia_code solve_all(struct cohort *k, int jobs, struct ischia_error *err)
 {
     TRY(line_out_write(&k->out, k->columns.header, strlen(k->columns.header), err));
-    TRY(crew_start(&k->crew, jobs, err));
+    TRY(crew_start(&k->crew, jobs, k->estimator, err));
     const enum ischia_code code = solve_rows(k, err);
     crew_stop(&k->crew);
     for (int i = 0; i < WINDOW; i++) free(k->window[i].echo);
@@ -228,7 +240,7 @@ static enum ischia_code read_header(struct cohort *k, struct ischia_error *err)
     TRY(csv_read(&k->reader, &row, &end, err));
     CHECK(!end, err, ISCHIA_E_INPUT, "%s is empty; the first row names the columns", k->path);
     doc_faults_init(&faults);
-    const enum ischia_code code = cohort_columns_init(&k->columns, &row, &faults, err);
+    const enum ischia_code code = cohort_columns_init(&k->columns, &row, k->sd, &faults, err);
     for (size_t i = 0; i < faults.count; i++) say_line(k, row.line, faults.item[i].detail);
     return code;
 }
@@ -250,7 +262,9 @@ static int run(struct cohort *k, FILE *in, const char *output, int jobs)
     bar_init(&k->bar);
     if (fstat(fileno(in), &status) == 0 && S_ISREG(status.st_mode)) k->file_bytes = status.st_size;
     if (read_header(k, &err) != ISCHIA_OK) return report_error("cohort", &err);
-    enum ischia_code code = line_out_open(&k->out, output, in, &err);
+    enum ischia_code code = ISCHIA_OK;
+    if (k->columns.has_sd) code = uncertain_emulator(&k->estimator, k->emulator, &err);
+    if (code == ISCHIA_OK) code = line_out_open(&k->out, output, in, &err);
     if (code == ISCHIA_OK) {
         code = solve_all(k, jobs, &err);
         struct ischia_error *second = code == ISCHIA_OK ? &err : NULL; /* the first one counts */
@@ -258,6 +272,7 @@ static int run(struct cohort *k, FILE *in, const char *output, int jobs)
         if (code == ISCHIA_OK) code = closed;
     }
     cohort_columns_finish(&k->columns);
+    estimator_destroy(k->estimator);
     if (code != ISCHIA_OK) return report_error("cohort", &err);
     say_counts(k);
     if (k->count[ROW_REFUSED] > 0) return EXIT_BAD_INPUT;
@@ -278,8 +293,14 @@ static bool defaults_are_known(const struct case_doc_defaults *defaults)
     return faults.count == 0;
 }
 
-static int run_file(const char *path, const char *output, int jobs,
-                    const struct case_doc_defaults *defaults)
+struct cohort_options {
+    const char *output, *emulator;
+    int jobs;
+    enum cohort_sd sd;
+    struct case_doc_defaults defaults;
+};
+
+static int run_file(const char *path, const struct cohort_options *options)
 {
     struct ischia_error err;
     FILE *in;
@@ -288,8 +309,10 @@ static int run_file(const char *path, const char *output, int jobs,
     int status = EXIT_SOLVE_FAILED;
     if (k != NULL) {
         k->path = strcmp(path, "-") == 0 ? "standard input" : path;
-        k->defaults = *defaults;
-        status = run(k, in, output, jobs);
+        k->emulator = options->emulator;
+        k->sd = options->sd;
+        k->defaults = options->defaults;
+        status = run(k, in, options->output, options->jobs);
     } else {
         (void)fprintf(stderr, "ischia cohort: out of memory\n");
     }
@@ -298,33 +321,47 @@ static int run_file(const char *path, const char *output, int jobs,
     return status;
 }
 
+static bool sd_is_known(const struct cli_usage *usage, const char *sd)
+{
+    if (sd == NULL || strcmp(sd, "typical") == 0) return true;
+    (void)fprintf(stderr, "ischia %s: --sd is %s; accepted: typical\n", usage->command, sd);
+    return false;
+}
+
 int command_cohort(int argc, char **argv)
 {
-    const char *output = "-", *jobs_text = "1", *path = "-";
-    struct case_doc_defaults defaults = {NULL, NULL};
+    const char *jobs_text = "1", *path = "-", *sd = NULL;
+    struct cohort_options options = {.output = "-"};
     const struct cli_option table[] = {
-        {"--output", 'o', "OUT", "where to (default: standard output)", &output, NULL},
+        {"--output", 'o', "OUT", "where to (default: standard output)", &options.output, NULL},
         {"--jobs", 'j', "N", "how many rows to solve at once (default 1)", &jobs_text, NULL},
         {"--resolution", 0, "NAME", "standard, fine or coarse, for a file without that column",
-         &defaults.resolution, NULL},
+         &options.defaults.resolution, NULL},
         {"--model", 0, "NAME", "a named set of model options, for a file without that column",
-         &defaults.model, NULL},
+         &options.defaults.model, NULL},
+        {"--sd", 0, "typical",
+         "intervals, by the usual uncertainty of measurements, for a file without that column", &sd,
+         NULL},
+        {"--emulator", 0, "FILE", "a trained emulator instead of the installed one, for intervals",
+         &options.emulator, NULL},
         {0},
     };
     const struct cli_usage usage = {
         .command = "cohort",
         .synopsis = "[FILE.csv|-]",
-        .about = "Solves every row of a CSV file with the columns R1, R2, eM, eF, muM, muF and F\n"
-                 "(or R1_mm ... F_N). Other columns are kept; status, reason and the results come\n"
-                 "behind them, in the order of the file. A bad row is refused and the rest solved.",
+        .about =
+            "Solves every row of a CSV file with the columns R1, R2, eM, eF, muM, muF and F\n"
+            "(or R1_mm ... F_N). Other columns are kept; status, reason and the results come\n"
+            "behind them, in the order of the file. A bad row is refused and the rest solved.\n"
+            "With columns sd.R1 ... sd.F (standard deviations) or sd, intervals come last.",
         .options = table,
         .operands_max = 1,
     };
-    int jobs;
     const enum cli_parse parsed = cli_parse_options(&usage, argc, argv, &path);
     if (parsed != CLI_RUN) return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
-    if (!cli_whole_number(&usage, "--jobs", jobs_text, 1, CREW_MEMBERS_MAX, &jobs))
+    if (!cli_whole_number(&usage, "--jobs", jobs_text, 1, CREW_MEMBERS_MAX, &options.jobs))
         return EXIT_BAD_INPUT;
-    if (!defaults_are_known(&defaults)) return EXIT_BAD_INPUT;
-    return (int)run_file(path, output, jobs, &defaults);
+    if (!sd_is_known(&usage, sd) || !defaults_are_known(&options.defaults)) return EXIT_BAD_INPUT;
+    options.sd = sd != NULL ? COHORT_SD_TYPICAL : COHORT_SD_READ;
+    return run_file(path, &options);
 }

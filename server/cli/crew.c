@@ -13,10 +13,11 @@
 #include <unistd.h>
 
 #include "server/cli/run.h"
+#include "server/cli/uncertain.h"
 
 struct job {
     long number;
-    struct ischia_case c;
+    struct crew_order order;
 };
 
 /* ---- the member's side ---- */
@@ -42,18 +43,31 @@ static bool send_all(int fd, const void *bytes, size_t length)
     return true;
 }
 
-static void answer(struct ischia_solver *solver, const struct job *job, struct crew_answer *ret)
+/* The solve, and the interval when it is asked for and there is something to put it around. */
+static enum ischia_code carry_out(struct ischia_solver *solver, const struct estimator *estimator,
+                                  const struct crew_order *order, struct crew_answer *ret,
+                                  struct ischia_error *err)
+{
+    TRY(timed_solve(solver, &order->c, NULL, &ret->result, NULL, err));
+    if (!order->has_sd || !ischia_result_converged(&ret->result)) return ISCHIA_OK;
+    ret->has_uncertainty = true;
+    return uncertain_interval(&ret->uncertainty, estimator, &order->c, order->sd, &ret->result,
+                              err);
+}
+
+static void answer(struct ischia_solver *solver, const struct estimator *estimator,
+                   const struct job *job, struct crew_answer *ret)
 {
     struct ischia_error err;
     memset(ret, 0, sizeof *ret); /* the gaps between members travel too */
     ret->job = job->number;
-    ret->code = timed_solve(solver, &job->c, NULL, &ret->result, NULL, &err);
+    ret->code = carry_out(solver, estimator, &job->order, ret, &err);
     if (ret->code != ISCHIA_OK)
         (void)snprintf(ret->message, sizeof ret->message, "%s", err.message);
 }
 
 /* Solves what comes until there is nothing more. A solver that cannot be made answers so. */
-static void work(int fd)
+static void work(int fd, const struct estimator *estimator)
 {
     static struct crew_answer reply;
     struct ischia_solver *solver = NULL;
@@ -62,7 +76,7 @@ static void work(int fd)
     const enum ischia_code made = ischia_solver_create(&solver, &err);
     while (receive_all(fd, &job, sizeof job)) {
         if (made == ISCHIA_OK) {
-            answer(solver, &job, &reply);
+            answer(solver, estimator, &job, &reply);
         } else {
             memset(&reply, 0, sizeof reply);
             reply.job = job.number;
@@ -83,7 +97,7 @@ __attribute__((noreturn)) static void become_member(const struct crew *crew, pid
     if (getppid() == parent) {
         for (int i = 0; i < crew->count; i++)
             if (crew->member[i].fd >= 0) (void)close(crew->member[i].fd);
-        work(fd);
+        work(fd, crew->estimator);
     }
     _exit(0);
 }
@@ -110,10 +124,12 @@ static enum ischia_code start_member(struct crew *crew, struct crew_member *ret,
     return ISCHIA_OK;
 }
 
-enum ischia_code crew_start(struct crew *ret, int count, struct ischia_error *err)
+enum ischia_code crew_start(struct crew *ret, int count, const struct estimator *estimator,
+                            struct ischia_error *err)
 {
     assert(count >= 1 && count <= CREW_MEMBERS_MAX);
     ret->count = 0;
+    ret->estimator = estimator;
     while (ret->count < count) {
         const enum ischia_code code = start_member(ret, &ret->member[ret->count], err);
         if (code != ISCHIA_OK) {
@@ -162,7 +178,7 @@ bool crew_is_working(const struct crew *crew)
     return false;
 }
 
-enum ischia_code crew_give(struct crew *crew, int number, long job, const struct ischia_case *c,
+enum ischia_code crew_give(struct crew *crew, int number, long job, const struct crew_order *order,
                            struct ischia_error *err)
 {
     struct job message;
@@ -170,7 +186,7 @@ enum ischia_code crew_give(struct crew *crew, int number, long job, const struct
     struct crew_member *member = &crew->member[number];
     memset(&message, 0, sizeof message);
     message.number = job;
-    message.c = *c;
+    message.order = *order;
     if (!send_all(member->fd, &message, sizeof message)) { /* it died while idle: one new try */
         (void)end_member(member);
         TRY(start_member(crew, member, err));

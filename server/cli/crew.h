@@ -5,9 +5,11 @@
 #include <stdbool.h>
 #include <sys/types.h>
 
+#include "server/estimator.h"
 #include "solver/case.h"
 #include "solver/error.h"
 #include "solver/result.h"
+#include "solver/study/uncertainty.h"
 
 /*
  * Processes that solve cases side by side, each with its own solver. A member that dies (killed,
@@ -24,7 +26,15 @@ struct crew_member {
 
 struct crew {
     int count;
+    const struct estimator *estimator; /* not ours; NULL: no emulator */
     struct crew_member member[CREW_MEMBERS_MAX];
+};
+
+/* What one member is to do. */
+struct crew_order {
+    struct ischia_case c;
+    bool has_sd; /* an interval too, when the solve converges */
+    double sd[ISCHIA_PARAM_COUNT];
 };
 
 struct crew_answer {
@@ -33,10 +43,14 @@ struct crew_answer {
     enum ischia_code code; /* ISCHIA_OK: result holds the end of the solve, converged or not */
     char message[ISCHIA_ERROR_MESSAGE_BYTES]; /* unless ISCHIA_OK */
     struct ischia_result result;
+    bool has_uncertainty;
+    struct ischia_uncertainty uncertainty; /* without the solves that check it */
 };
 
-/* Starts count processes (1 ... CREW_MEMBERS_MAX). ISCHIA_E_IO when one cannot be started. */
+/* Starts count processes (1 ... CREW_MEMBERS_MAX). estimator: for intervals, outlives the crew, may
+ * be NULL. ISCHIA_E_IO when one cannot be started. */
 ISCHIA_MUST_CHECK enum ischia_code crew_start(struct crew *ret, int count,
+                                              const struct estimator *estimator,
                                               struct ischia_error *err);
 void crew_stop(struct crew *crew); /* ends them all, working or not */
 
@@ -47,9 +61,10 @@ int crew_idle(const struct crew *crew);
 bool crew_is_idle(const struct crew *crew, int member);
 bool crew_is_working(const struct crew *crew);
 
-/* Gives a case to an idle member (asserted). job: 0 or more, the caller's number. */
+/* Gives work to an idle member (asserted). job: 0 or more, the caller's number. */
 ISCHIA_MUST_CHECK enum ischia_code crew_give(struct crew *crew, int member, long job,
-                                             const struct ischia_case *c, struct ischia_error *err);
+                                             const struct crew_order *order,
+                                             struct ischia_error *err);
 
 /* Waits for the next answer (somebody is working, asserted). */
 ISCHIA_MUST_CHECK enum ischia_code crew_wait(struct crew *crew, struct crew_answer *ret,

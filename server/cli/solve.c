@@ -49,18 +49,6 @@ static enum ischia_code write_fields(const struct solve_options *options,
     return ISCHIA_OK;
 }
 
-/* The emulator that was named, else the one that came with the program, if there is one. It is
- * only read when the inputs are uncertain. */
-static enum ischia_code load_emulator(const struct solve_options *options,
-                                      const struct ischia_request *request, struct estimator **ret,
-                                      struct ischia_error *err)
-{
-    char path[ESTIMATOR_PATH_BYTES];
-    if (!request->has_sd) return ISCHIA_OK;
-    if (options->emulator != NULL) return estimator_create(ret, options->emulator, err);
-    return estimator_installed(path) ? estimator_create(ret, path, err) : ISCHIA_OK;
-}
-
 static enum ischia_code compute(const struct solve_options *options,
                                 const struct ischia_request *request,
                                 struct uncertain_solution *ret, struct ischia_error *err)
@@ -69,7 +57,8 @@ static enum ischia_code compute(const struct solve_options *options,
     struct estimator *estimator = NULL;
     struct bar bar;
     const struct ischia_observer observer = observe_with_bar(&bar);
-    enum ischia_code code = load_emulator(options, request, &estimator, err);
+    enum ischia_code code = ISCHIA_OK;
+    if (request->has_sd) code = uncertain_emulator(&estimator, options->emulator, err);
     if (code == ISCHIA_OK) code = ischia_solver_create(&solver, err);
     if (code == ISCHIA_OK) code = uncertain_solve(solver, estimator, request, &observer, ret, err);
     ischia_solver_destroy(solver);

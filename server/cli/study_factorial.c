@@ -235,9 +235,9 @@ static enum ischia_code row_answered(struct study *s, const struct crew_answer *
     CHECK(answer->code != ISCHIA_E_MEMORY, err, ISCHIA_E_MEMORY,
           "row %zu: %.400s; use fewer processes (-j)", row + 1, answer->message);
     if (answer->code == ISCHIA_E_STATE && !s->died[row]) {
-        const struct ischia_case c = design_case(&s->plan.design, &s->plan.points, row);
+        const struct crew_order order = {.c = design_case(&s->plan.design, &s->plan.points, row)};
         s->died[row] = true;
-        return crew_give(&s->crew, answer->member, answer->job, &c, err);
+        return crew_give(&s->crew, answer->member, answer->job, &order, err);
     }
     text_out_init(&text);
     put_answer(&text, answer, &s->plan);
@@ -256,9 +256,9 @@ static enum ischia_code refuse(struct study *s, size_t row, const struct ischia_
 
 static enum ischia_code give_row(struct study *s, int member, size_t row, struct ischia_error *err)
 {
-    const struct ischia_case c = design_case(&s->plan.design, &s->plan.points, row);
-    if (!ischia_case_is_valid(&c)) return refuse(s, row, &c, err);
-    return crew_give(&s->crew, member, (long)row, &c, err);
+    const struct crew_order order = {.c = design_case(&s->plan.design, &s->plan.points, row)};
+    if (!ischia_case_is_valid(&order.c)) return refuse(s, row, &order.c, err);
+    return crew_give(&s->crew, member, (long)row, &order, err);
 }
 
 /* The next row of the side that a member is at, or the first of the next; false: none is left. */
@@ -332,7 +332,7 @@ static enum ischia_code solve_rows(struct study *s, struct ischia_error *err)
     start_progress(s);
     TRY(study_sides_init(&s->sides, &s->plan.design, &s->plan.points, is_unsolved, s, err));
     if (s->done < s->total) {
-        TRY(crew_start(&s->crew, s->arguments->jobs, err));
+        TRY(crew_start(&s->crew, s->arguments->jobs, NULL, err));
         const enum ischia_code code = work_through(s, err);
         crew_stop(&s->crew);
         TRY(code);

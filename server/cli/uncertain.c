@@ -24,6 +24,24 @@ const struct ischia_uncertainty *uncertain_of(const struct uncertain_solution *s
     return solution->has_uncertainty ? &solution->uncertainty : NULL;
 }
 
+enum ischia_code uncertain_emulator(struct estimator **ret, const char *path,
+                                    struct ischia_error *err)
+{
+    char installed[ESTIMATOR_PATH_BYTES];
+    *ret = NULL;
+    if (path == NULL && !estimator_installed(installed)) return ISCHIA_OK;
+    return estimator_create(ret, path != NULL ? path : installed, err);
+}
+
+enum ischia_code uncertain_interval(struct ischia_uncertainty *ret,
+                                    const struct estimator *estimator, const struct ischia_case *c,
+                                    const double sd[ISCHIA_PARAM_COUNT],
+                                    const struct ischia_result *result, struct ischia_error *err)
+{
+    return uncertainty_compute(ret, estimator != NULL ? &estimator->predictor : NULL, c, sd, result,
+                               UNCERTAINTY_SEED, err);
+}
+
 static enum ischia_code solve_checks(struct ischia_solver *solver, const struct ischia_case *c,
                                      struct stage *stage, struct ischia_uncertainty *u,
                                      struct ischia_error *err)
@@ -47,8 +65,7 @@ add_uncertainty(struct ischia_solver *solver, const struct estimator *estimator,
     double sd[ISCHIA_PARAM_COUNT];
     struct ischia_uncertainty *u = &solution->uncertainty;
     case_doc_sd(request, sd);
-    TRY(uncertainty_compute(u, estimator != NULL ? &estimator->predictor : NULL, &request->values,
-                            sd, &solution->result, UNCERTAINTY_SEED, err));
+    TRY(uncertain_interval(u, estimator, &request->values, sd, &solution->result, err));
     u->typical = request->sd_typical;
     solution->has_uncertainty = true;
     return solve_checks(solver, &request->values, stage, u, err);

@@ -20,6 +20,18 @@ struct uncertain_solution {
 /* NULL when there are none in this solution: what result_doc_text takes. */
 const struct ischia_uncertainty *uncertain_of(const struct uncertain_solution *solution);
 
+/* The emulator at path, or with NULL the one that came with the program: *ret is the caller's to
+ * destroy, NULL when none did. Errors as estimator_create. */
+ISCHIA_MUST_CHECK enum ischia_code uncertain_emulator(struct estimator **ret, const char *path,
+                                                      struct ischia_error *err);
+
+/* The interval alone, without the solves that check it. result is the converged solve of c, sd is
+ * valid (asserted both); estimator as below. ISCHIA_E_MEMORY. */
+ISCHIA_MUST_CHECK enum ischia_code
+uncertain_interval(struct ischia_uncertainty *ret, const struct estimator *estimator,
+                   const struct ischia_case *c, const double sd[ISCHIA_PARAM_COUNT],
+                   const struct ischia_result *result, struct ischia_error *err);
+
 /* estimator: NULL when no emulator is there. Progress runs over all solves. Errors as ischia_solve;
  * *ret is untouched then. */
 ISCHIA_MUST_CHECK enum ischia_code

@@ -8,6 +8,7 @@
 #include "api/problem_doc.h"
 #include "api/result_csv.h"
 #include "api/result_doc.h"
+#include "api/uncertainty_csv.h"
 #include "api/uncertainty_doc.h"
 #include "server/http/query.h"
 #include "server/http/reply.h"
@@ -163,15 +164,6 @@ static const char *const csv_head[] = {"id",   "created_at", "finished_at", "sub
                                        "side", "label",      "measured_at", "resolution"};
 enum { CSV_HEAD_COUNT = sizeof csv_head / sizeof csv_head[0] };
 
-/* After the columns of a cohort: what nine samples in ten lie between; empty when unknown. */
-static const struct {
-    const char *name;
-    int quantile;
-} csv_intervals[] = {{"eps_max_q05", 0},
-                     {"eps_max_q50", UNCERTAINTY_QUANTILES / 2},
-                     {"eps_max_q95", UNCERTAINTY_QUANTILES - 1}};
-enum { CSV_INTERVAL_COUNT = sizeof csv_intervals / sizeof csv_intervals[0] };
-
 struct csv_page {
     struct text_out out;
     enum ischia_code code;
@@ -183,7 +175,7 @@ static void put_csv_header(struct text_out *out)
     for (int i = 0; i < CSV_HEAD_COUNT; i++) csv_put_text(out, csv_head[i], i == 0);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) csv_put_text(out, ischia_params[i].key, false);
     result_csv_put_header(out, false);
-    for (int i = 0; i < CSV_INTERVAL_COUNT; i++) csv_put_text(out, csv_intervals[i].name, false);
+    uncertainty_csv_put_header(out);
     csv_end_row(out);
 }
 
@@ -216,14 +208,7 @@ static void put_csv_interval(struct csv_page *page, const struct store_assessmen
     if (row->result_json != NULL && page->code == ISCHIA_OK)
         page->code = uncertainty_doc_read(&u, &present, row->result_json, strlen(row->result_json),
                                           &page->err);
-    for (int i = 0; i < CSV_INTERVAL_COUNT; i++) {
-        const double value =
-            present ? u.quantile[UNCERTAIN_EPS_MAX][csv_intervals[i].quantile] : (double)NAN;
-        if (isnan(value))
-            csv_put_text(&page->out, "", false);
-        else
-            csv_put_number(&page->out, value, false);
-    }
+    uncertainty_csv_put(&page->out, present ? &u : NULL);
 }
 
 static bool write_csv_row(void *context, const struct store_assessment *row)

@@ -5,6 +5,7 @@ an emulator that is the same one: intervals against a Monte Carlo of that polyno
 the command line and through the service. Usage: uncertainty_test.py PROGRAM SOURCE_ROOT
 """
 
+import csv
 import hashlib
 import json
 import os
@@ -147,6 +148,53 @@ class Intervals(unittest.TestCase):
             self.assertAlmostEqual(u["sensitivity"]["total"][k], whole, delta=0.02)
         self.assertEqual(u["sensitivity"]["total"]["eM"], 0)
 
+    def assertColumns(self, columns, u):
+        """A row of a CSV file says what the document says."""
+        self.assertEqual(columns["uncertainty"], "given")
+        for name, at in (("eps_max_q05", 0), ("eps_max_q50", 2), ("eps_max_q95", 4)):
+            self.assertAlmostEqual(float(columns[name]), u["strain"]["eps_max"][at])
+        for name in ("shear", "compression", "both"):
+            self.assertEqual(float(columns["share_" + name]), u["share_crossing"][name])
+        total = u["sensitivity"]["total"]
+        best = max(total, key=lambda k: total[k])
+        self.assertEqual(columns["measure_better"], best)
+        self.assertAlmostEqual(float(columns["measure_better_index"]), total[best])
+
+    def cohort(self, text, *options):
+        done = subprocess.run(
+            [PROGRAM, "cohort", "--emulator", self.path, *options, "-"],
+            input=text,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return done, list(csv.DictReader(done.stdout.splitlines()))
+
+    def test_rows_of_a_cohort_have_them(self):
+        values = ",".join(str(CASE[k]) for k in KEYS)
+        text = f"{','.join(KEYS)},sd,sd.R1,sd.R2,sd.muM,sd.F\n"
+        text += f"{values},,0.5,6,0.6,30\n{values},typical,,,,\n{values},,,,,\n{values},,x,,,\n"
+        done, rows = self.cohort(text, "-j", "2")
+        self.assertEqual(done.returncode, 2)
+        self.assertColumns(rows[0], self.uncertainty())
+        self.assertColumns(rows[1], self.uncertainty("typical"))
+        self.assertEqual([r["status"] for r in rows], [*3 * ["succeeded"], "refused"])
+        for row in rows[2:]:
+            self.assertEqual((row["uncertainty"], row["eps_max_q50"]), ("", ""))
+        self.assertIn("sd.R1", rows[3]["reason"])
+
+    def test_a_cohort_without_them_has_typical_ones_on_request(self):
+        text = f"{','.join(KEYS)}\n{','.join(str(CASE[k]) for k in KEYS)}\n"
+        self.assertColumns(self.cohort(text, "--sd", "typical")[1][0], self.uncertainty("typical"))
+        self.assertNotIn("uncertainty", self.cohort(text)[1][0])
+        own = "{},uncertainty\n{},mine\n".format(*text.splitlines())
+        self.assertEqual(self.cohort(own)[1][0]["uncertainty"], "mine")
+        refused = self.cohort(own, "--sd", "typical")[0]
+        self.assertIn("column uncertainty is the name of a result column", refused.stderr)
+        self.assertIn("accepted: typical", self.cohort(text, "--sd", "usual")[0].stderr)
+        other = self.cohort(text, "--sd", "typical", "--model", "as-published")[1][0]
+        self.assertEqual((other["uncertainty"], other["eps_max_q05"]), ("other_model", ""))
+
     def test_sd_of_zero_gives_the_point(self):
         result = solve(self.path, {**CASE, "sd": {"R1": 0}})
         point = result["strain"]["eps_max"]
@@ -264,8 +312,7 @@ class ThroughTheService(Intervals):
         head, row = (line.split(",") for line in answer.body.decode().split()[:2])
         columns = dict(zip(head, row))
         u = self.uncertainty()
-        for name, at in (("eps_max_q05", 0), ("eps_max_q50", 2), ("eps_max_q95", 4)):
-            self.assertAlmostEqual(float(columns[name]), u["strain"]["eps_max"][at])
+        self.assertColumns(columns, u)
 
 
 if __name__ == "__main__":
