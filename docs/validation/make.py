@@ -24,7 +24,7 @@ import tempfile
 
 import plots
 import runs
-from page_readings import compressibility, lost_runs, readings
+from page_readings import compressibility, force_in_soft_muscle, lost_runs, readings
 from readings import SUBSETS
 from words import percent, quantile, signed, solved, table, value
 
@@ -709,6 +709,7 @@ def main():
                     emulator,
                     readings,
                     compressibility,
+                    force_in_soft_muscle,
                     lost_runs,
                     printed_check,
                     provenance,
