@@ -378,17 +378,30 @@ static bool takes_up(struct solve *last, const struct ischia_case *c)
     return true;
 }
 
+/* Attempts that the last solve gave up and that this case would give up just so: they are not made
+ * again. Their work counts as if they had been. */
+static void skip_attempts(struct solve *s, const struct solve *last)
+{
+    if (last == NULL || !last->fails_larger || !is_same_side(&last->c, &s->c) ||
+        s->c.param[ISCHIA_F] < last->c.param[ISCHIA_F])
+        return;
+    s->attempt = last->attempt;
+    s->before = last->before;
+}
+
 /* The solver's solve, ready for a case. */
 static enum ischia_code solve_begin(struct ischia_solver *solver, const struct ischia_case *c,
                                     struct ischia_error *err)
 {
     if (takes_up(solver->last, c)) return ISCHIA_OK;
+    struct solve *s = calloc(1, sizeof *s);
+    CHECK(s != NULL, err, ISCHIA_E_MEMORY, "not enough memory for a solve");
+    s->c = *c;
+    s->fails_larger = true;
+    skip_attempts(s, solver->last);
     ischia_solver_forget(solver);
-    solver->last = calloc(1, sizeof *solver->last);
-    CHECK(solver->last != NULL, err, ISCHIA_E_MEMORY, "not enough memory for a solve");
-    solver->last->c = *c;
-    solver->last->fails_larger = true;
-    return solve_init(solver->last, solver, err);
+    solver->last = s;
+    return solve_init(s, solver, err);
 }
 
 enum ischia_code ischia_solve(struct ischia_solver *solver, const struct ischia_case *c,

@@ -212,24 +212,42 @@ static int iterations_for(struct ischia_solver *solver, const struct ischia_case
     return calls;
 }
 
-/* A soft side whose first attempt ends below the smaller force: it is not made again. */
+/* A soft side whose first attempt ends below the smaller force; then the larger one. Iterations
+ * made, of how many the result counts. */
+static int iterations_after(const double param[ISCHIA_PARAM_COUNT], double larger_N, int *ret_of)
+{
+    struct ischia_solver *solver = solver_make(), *fresh = solver_make();
+    struct ischia_case c = coarse_case(0);
+    memcpy(c.param, param, sizeof c.param);
+    const struct ischia_result r = solve(solver, &c, NULL);
+    assert_non_null(strstr(r.numerics.detail, "corners"));
+    c.param[ISCHIA_F] = larger_N;
+    struct ischia_result cold, warm;
+    *ret_of = iterations_for(fresh, &c, &cold);
+    const int on = iterations_for(solver, &c, &warm);
+    same_bits(&warm, &cold);
+    ischia_solver_destroy(solver);
+    ischia_solver_destroy(fresh);
+    return on;
+}
+
 static void a_later_attempt_goes_on_too(void **state)
 {
     (void)state;
     static const double param[ISCHIA_PARAM_COUNT] = {3, 39, 19, 35, 1, 8, 192};
-    struct ischia_solver *solver = solver_make(), *fresh = solver_make();
-    struct ischia_case c = coarse_case(0);
-    memcpy(c.param, param, sizeof param);
-    const struct ischia_result r = solve(solver, &c, NULL);
-    assert_non_null(strstr(r.numerics.detail, "corners"));
-    c.param[ISCHIA_F] = 310;
-    struct ischia_result cold, warm;
-    const int from_rest = iterations_for(fresh, &c, &cold);
-    const int on = iterations_for(solver, &c, &warm);
+    int from_rest;
+    const int on = iterations_after(param, 310, &from_rest);
     assert_in_range(on, 1, from_rest / 3);
-    same_bits(&warm, &cold);
-    ischia_solver_destroy(solver);
-    ischia_solver_destroy(fresh);
+}
+
+/* A path whose last step was taken in parts cannot go on and starts again, with its own attempt. */
+static void attempts_given_up_are_not_made_again(void **state)
+{
+    (void)state;
+    static const double param[ISCHIA_PARAM_COUNT] = {3, 15, 19, 22, 1, 2.8, 270};
+    int from_rest;
+    const int on = iterations_after(param, 310, &from_rest);
+    assert_in_range(on, from_rest / 3, 2 * from_rest / 3);
 }
 
 static void going_on_is_less_work_until_forgotten(void **state)
@@ -326,6 +344,7 @@ int main(void)
         cmocka_unit_test(same_case_same_bits),
         cmocka_unit_test(a_larger_force_goes_on_with_the_same_bits),
         cmocka_unit_test(a_later_attempt_goes_on_too),
+        cmocka_unit_test(attempts_given_up_are_not_made_again),
         cmocka_unit_test(going_on_is_less_work_until_forgotten),
         cmocka_unit_test(progress_never_goes_back),
         cmocka_unit_test(cancelling_leaves_no_trace),
