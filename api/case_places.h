@@ -8,7 +8,7 @@
  * A case that is read out of somebody else's document: the values go through case_doc_fields, and
  * their faults are reported where the document has them.
  */
-enum { CASE_PLACES_MAX = 16 };
+enum { CASE_PLACES_MAX = 24 };
 struct case_places {
     struct case_doc_fields fields;
     struct doc_faults found; /* of fields: pointers are "/muM" */

@@ -123,6 +123,18 @@ static void put_input_parameters(struct json_out *out)
     }
 }
 
+static void put_deviation_parameters(struct json_out *out)
+{
+    char documentation[120], name[16];
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++) {
+        (void)snprintf(name, sizeof name, "sd.%s", ischia_params[i].key);
+        (void)snprintf(documentation, sizeof documentation,
+                       "Standard deviation of %s, as it was measured: the result gets an interval.",
+                       ischia_params[i].key);
+        put_parameter(out, name, "in", 0, "Quantity", documentation);
+    }
+}
+
 static bool put_operation(struct json_out *out, const char *id)
 {
     if (strcmp(id, "assess") != 0) return false;
@@ -147,6 +159,10 @@ static bool put_operation(struct json_out *out, const char *id)
     put_parameter(out, "label", "in", 0, "string", "Free text of your own.");
     put_parameter(out, "resolution", "in", 0, "code", "Of the mesh: standard or fine.");
     put_parameter(out, "model", "in", 0, "code", "A named set of model options.");
+    put_parameter(out, "sd", "in", 0, "code",
+                  "typical: usual standard deviations of the inputs, where sd.R1 and so on do not "
+                  "say others.");
+    put_deviation_parameters(out);
     put_parameter(out, "return", "out", 1, "Bundle",
                   "RiskAssessment, Observations, DiagnosticReport, Provenance and Device.");
     json_close_array(out);

@@ -60,12 +60,11 @@ static bool quantity_is_plain(struct reader *r, const struct json *q, const char
     return false;
 }
 
-/* The digits of a number in the canonical unit; false with a fault. */
-static bool take_quantity(struct reader *r, const struct json *q, int param, const char *where,
-                          char ret[UCUM_DIGITS_BYTES])
+/* The digits of a number in the unit of an input; false with a fault. */
+static bool take_quantity(struct reader *r, const struct json *q, const char *key, const char *unit,
+                          const char *where, char ret[UCUM_DIGITS_BYTES])
 {
     char known[96], shown[24];
-    const char *unit = ischia_params[param].unit, *key = ischia_params[param].key;
     if (!is_object(q)) {
         doc_faults_add(r->faults, where, "wrong_type", "%s is not a Quantity", key);
         return false;
@@ -78,18 +77,34 @@ static bool take_quantity(struct reader *r, const struct json *q, int param, con
                        ucum_known(unit, known, sizeof known));
         return false;
     }
-    if (strcmp(code, unit) == 0 && strlen(given) < ORIGIN_DIGITS_BYTES)
-        (void)snprintf(r->input->origin.digits[param], ORIGIN_DIGITS_BYTES, "%s", given);
     return true;
 }
 
-static void read_quantity(struct reader *r, const struct json *q, int param, const char *where)
+/* An input is given back with the digits that it came with. */
+static void keep_digits(struct reader *r, const struct json *q, int param)
+{
+    const char *given = json_digits(json_member(q, "value"));
+    if (strcmp(text_of(q, "code"), ischia_params[param].unit) == 0 &&
+        strlen(given) < ORIGIN_DIGITS_BYTES)
+        (void)snprintf(r->input->origin.digits[param], ORIGIN_DIGITS_BYTES, "%s", given);
+}
+
+/* key: of the input, or of its standard deviation. */
+static bool read_quantity(struct reader *r, const struct json *q, int param, const char *key,
+                          const char *where)
 {
     char digits[UCUM_DIGITS_BYTES];
-    if (take_quantity(r, q, param, where, digits))
-        case_places_set(&r->places, ischia_params[param].key, digits, where);
+    const bool taken = take_quantity(r, q, key, ischia_params[param].unit, where, digits);
+    if (taken)
+        case_places_set(&r->places, key, digits, where);
     else
-        case_places_refuse(&r->places, ischia_params[param].key, where);
+        case_places_refuse(&r->places, key, where);
+    return taken;
+}
+
+static void read_input(struct reader *r, const struct json *q, int param, const char *where)
+{
+    if (read_quantity(r, q, param, ischia_params[param].key, where)) keep_digits(r, q, param);
 }
 
 /* ---- the person ---- */
@@ -245,7 +260,7 @@ static void read_observation(struct reader *r, const struct json *observation, c
     take_time(r, observation);
     if (json_member(observation, "subject") != NULL)
         read_subject(r, json_member(observation, "subject"), where);
-    read_quantity(r, json_member(observation, "valueQuantity"), measure, where);
+    read_input(r, json_member(observation, "valueQuantity"), measure, where);
 }
 
 static void read_bundle(struct reader *r, const struct json *bundle, const char *root)
@@ -280,7 +295,10 @@ static const struct named {
     {"label", {"valueString"}},
     {"resolution", {"valueCode", "valueString"}},
     {"model", {"valueCode", "valueString"}},
+    {"sd", {"valueCode", "valueString"}},
 };
+
+static const char sd_prefix[] = "sd."; /* standard deviation of the input behind it */
 
 static int param_named(const char *name)
 {
@@ -314,16 +332,23 @@ static void read_observations(struct reader *r, const struct json *parameter, co
 
 static void read_parameter(struct reader *r, const struct json *parameter, const char *where)
 {
-    char shown[32];
+    char shown[32], key[16];
     const char *name = text_of(parameter, "name");
     if (name == NULL) {
         doc_faults_add(r->faults, where, "missing", "a parameter has no name");
         return;
     }
     if (is_modified(r, parameter, where)) return;
-    const int param = param_named(name);
+    const struct json *quantity = json_member(parameter, "valueQuantity");
+    const bool is_sd = strncmp(name, sd_prefix, sizeof sd_prefix - 1) == 0;
+    const int param = param_named(is_sd ? name + sizeof sd_prefix - 1 : name);
+    if (param >= 0 && is_sd) {
+        (void)snprintf(key, sizeof key, "%s%s", sd_prefix, ischia_params[param].key);
+        (void)read_quantity(r, quantity, param, key, where);
+        return;
+    }
     if (param >= 0) {
-        read_quantity(r, json_member(parameter, "valueQuantity"), param, where);
+        read_input(r, quantity, param, where);
         return;
     }
     if (strcmp(name, "subject") == 0) {

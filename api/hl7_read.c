@@ -131,38 +131,67 @@ static bool read_unit(struct reader *r, int segment, char *ret, size_t size)
     return false;
 }
 
-/* The digits of a number in the canonical unit; false with a fault. */
-static bool take_number(struct reader *r, int segment, int param, char ret[UCUM_DIGITS_BYTES])
+/* What an OBX that is a number says. */
+struct number {
+    char digits[ORIGIN_DIGITS_BYTES], unit[24];
+    char converted[UCUM_DIGITS_BYTES]; /* to the unit of the input */
+};
+
+/* False with a fault. key: of the input, or of its standard deviation. */
+static bool take_number(struct reader *r, int segment, int param, const char *key,
+                        struct number *ret)
 {
-    char type[8], value[ORIGIN_DIGITS_BYTES], unit[24], digits[ORIGIN_DIGITS_BYTES], known[96];
-    const struct ischia_param_info *p = &ischia_params[param];
-    if (!has_result(r, segment) || !read_unit(r, segment, unit, sizeof unit)) return false;
+    char type[8], value[ORIGIN_DIGITS_BYTES], known[96];
+    const char *unit = ischia_params[param].unit;
+    if (!has_result(r, segment) || !read_unit(r, segment, ret->unit, sizeof ret->unit))
+        return false;
     const bool read = hl7_get(r->m, segment, 2, 1, type, sizeof type) &&
                       hl7_get(r->m, segment, 5, 1, value, sizeof value);
-    plain_number(read ? value : "", digits);
-    if (!read || strcmp(type, "NM") != 0 || digits[0] == '\0') {
-        OBX_FAULT(r, 5, "wrong_type", "%s is not a number (OBX-2 NM)", p->key);
+    plain_number(read ? value : "", ret->digits);
+    if (!read || strcmp(type, "NM") != 0 || ret->digits[0] == '\0') {
+        OBX_FAULT(r, 5, "wrong_type", "%s is not a number (OBX-2 NM)", key);
         return false;
     }
-    if (ucum_convert(digits, unit, p->unit, ret) != UCUM_CONVERTED) {
-        OBX_FAULT(r, 6, "unsupported", "%s is in '%s'; accepted %s", p->key, unit,
-                  ucum_known(p->unit, known, sizeof known));
+    if (ucum_convert(ret->digits, ret->unit, unit, ret->converted) != UCUM_CONVERTED) {
+        OBX_FAULT(r, 6, "unsupported", "%s is in '%s'; accepted %s", key, ret->unit,
+                  ucum_known(unit, known, sizeof known));
         return false;
     }
-    if (strcmp(unit, p->unit) == 0)
-        (void)snprintf(r->input->origin.digits[param], ORIGIN_DIGITS_BYTES, "%s", digits);
     return true;
 }
 
-static void read_number(struct reader *r, int segment, int param)
+static bool read_number(struct reader *r, int segment, int param, const char *key,
+                        struct number *ret)
 {
-    char digits[UCUM_DIGITS_BYTES], where[DOC_POINTER_BYTES];
-    const char *key = ischia_params[param].key;
+    char where[DOC_POINTER_BYTES];
     (void)snprintf(where, sizeof where, "OBX^%d^5", r->sequence);
-    if (take_number(r, segment, param, digits))
-        case_places_set(&r->places, key, digits, where);
+    const bool taken = take_number(r, segment, param, key, ret);
+    if (taken)
+        case_places_set(&r->places, key, ret->converted, where);
     else
         case_places_refuse(&r->places, key, where);
+    return taken;
+}
+
+/* An input is given back with the digits that it came with. */
+static void read_input(struct reader *r, int segment, int param)
+{
+    struct number number;
+    if (read_number(r, segment, param, ischia_params[param].key, &number) &&
+        strcmp(number.unit, ischia_params[param].unit) == 0)
+        (void)snprintf(r->input->origin.digits[param], ORIGIN_DIGITS_BYTES, "%s", number.digits);
+}
+
+/* True for "sd.R1" and so on, which are then read. */
+static bool read_deviation(struct reader *r, int segment, const char *code)
+{
+    static const char prefix[] = "sd.";
+    struct number number;
+    const size_t length = sizeof prefix - 1;
+    const int param = strncmp(code, prefix, length) == 0 ? measure_find(code + length) : -1;
+    if (param < 0 || !measure_is_input(param)) return false;
+    (void)read_number(r, segment, param, code, &number);
+    return true;
 }
 
 /* The time of the observation: the latest of those that say a day. */
@@ -188,7 +217,7 @@ static void read_text(struct reader *r, int segment, const char *key)
 
 static void read_observation(struct reader *r, int segment)
 {
-    static const char *const texts[] = {"side", "label", "resolution", "model"};
+    static const char *const texts[] = {"side", "label", "resolution", "model", "sd"};
     char code[24], system[16];
     r->sequence++;
     if (!hl7_get(r->m, segment, 3, 3, system, sizeof system) || strcmp(system, HL7_SYSTEM) != 0)
@@ -200,6 +229,7 @@ static void read_observation(struct reader *r, int segment)
         read_text(r, segment, texts[i]);
         return;
     }
+    if (read_deviation(r, segment, code)) return;
     const int measure = measure_find(code);
     if (measure < 0) {
         OBX_FAULT(r, 3, "unknown", "'%s' is not a code of " HL7_SYSTEM, code);
@@ -207,7 +237,7 @@ static void read_observation(struct reader *r, int segment)
     }
     if (!measure_is_input(measure)) return; /* results of ours are not inputs */
     take_time(r, segment);
-    read_number(r, segment, measure);
+    read_input(r, segment, measure);
 }
 
 /* ---- the whole ---- */

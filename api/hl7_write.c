@@ -195,6 +195,20 @@ void hl7_put_result(struct text_out *out, const struct hl7_sender *sender,
         put_text_observation(out, &sequence, "problem", "Why there is no result", record->problem);
 }
 
+/* "typical", or a number for each input that is not known exactly. */
+static void put_deviations(struct text_out *out, int *sequence,
+                           const struct ischia_request *request)
+{
+    char digits[TEXT_NUMBER_BYTES];
+    if (request->sd_typical)
+        put_text_observation(out, sequence, "sd", "Standard deviations", "typical");
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
+        if (!request->sd_typical)
+            put(out, "OBX|%d|NM|sd.%s^Standard deviation^" HL7_SYSTEM "||%s|%s^^UCUM|||||F\r",
+                ++*sequence, ischia_params[i].key, text_from_number(request->sd[i], digits),
+                ischia_params[i].unit);
+}
+
 void hl7_put_request(struct text_out *out, const struct hl7_sender *sender,
                      const struct ischia_request *request)
 {
@@ -213,4 +227,5 @@ void hl7_put_request(struct text_out *out, const struct hl7_sender *sender,
     if (request->label[0] != '\0')
         put_text_observation(out, &sequence, "label", "Label", request->label);
     put_text_observation(out, &sequence, "resolution", "Resolution", resolution);
+    if (request->has_sd) put_deviations(out, &sequence, request);
 }

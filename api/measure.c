@@ -81,9 +81,24 @@ static const struct result_row {
      offsetof(struct ischia_result, threshold_force_compression_N)},
 };
 
+static const struct interval_row {
+    struct measure measure;
+    int quantile;
+} intervals[MEASURE_INTERVAL_COUNT] = {
+    {{"eps_max_q05", "Shear strain on the axis, 5 % quantile", "1",
+      "Five in a hundred samples of the uncertain inputs have a smaller eps_max.",
+      "/result/uncertainty/strain/eps_max/0"},
+     0},
+    {{"eps_max_q95", "Shear strain on the axis, 95 % quantile", "1",
+      "Five in a hundred samples of the uncertain inputs have a larger eps_max.",
+      "/result/uncertainty/strain/eps_max/4"},
+     UNCERTAINTY_QUANTILES - 1},
+};
+
 struct measure measure_at(int index)
 {
     assert(index >= 0 && index < MEASURE_COUNT);
+    if (index >= MEASURE_FIRST_INTERVAL) return intervals[index - MEASURE_FIRST_INTERVAL].measure;
     if (!measure_is_input(index)) return results[index - ISCHIA_PARAM_COUNT].measure;
     const struct ischia_param_info *p = &ischia_params[index];
     return (struct measure){p->key, input_displays[index], p->unit,
@@ -97,9 +112,14 @@ int measure_find(const char *code)
     return -1;
 }
 
-double measure_value(int index, const struct ischia_case *c, const struct ischia_result *result)
+double measure_value(int index, const struct ischia_case *c, const struct ischia_result *result,
+                     const struct ischia_uncertainty *u)
 {
     if (measure_is_input(index)) return c->param[index];
+    if (index >= MEASURE_FIRST_INTERVAL) {
+        const int quantile = intervals[index - MEASURE_FIRST_INTERVAL].quantile;
+        return u == NULL ? (double)NAN : u->quantile[UNCERTAIN_EPS_MAX][quantile];
+    }
     const struct result_row *row = &results[index - ISCHIA_PARAM_COUNT];
     const bool of_largest = row->offset == offsetof(struct ischia_result,
                                                     clusters[ISCHIA_OVER_BOTH].largest.volume_mm3);

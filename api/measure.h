@@ -4,13 +4,20 @@
 
 #include "solver/case.h"
 #include "solver/result.h"
+#include "solver/study/uncertainty.h"
 
 /*
  * The mapping to record systems: every number that travels, a row each. FHIR Observations, the
  * CodeSystem, the OperationDefinition, HL7 v2 OBX segments and docs/INTEGRATION.md iterate it. The
- * first ISCHIA_PARAM_COUNT rows are the inputs, made from ischia_params; then the results.
+ * first ISCHIA_PARAM_COUNT rows are the inputs, made from ischia_params; then the results; then
+ * what uncertain inputs leave of them.
  */
-enum { MEASURE_RESULT_COUNT = 14, MEASURE_COUNT = ISCHIA_PARAM_COUNT + MEASURE_RESULT_COUNT };
+enum {
+    MEASURE_RESULT_COUNT = 14,
+    MEASURE_INTERVAL_COUNT = 2,
+    MEASURE_FIRST_INTERVAL = ISCHIA_PARAM_COUNT + MEASURE_RESULT_COUNT,
+    MEASURE_COUNT = MEASURE_FIRST_INTERVAL + MEASURE_INTERVAL_COUNT
+};
 enum { MEASURE_ID_BYTES = 32 };
 
 struct measure {
@@ -29,9 +36,10 @@ static inline bool measure_is_input(int index) { return index < ISCHIA_PARAM_COU
 /* The row with this code, -1 when there is none. */
 int measure_find(const char *code);
 
-/* The number; NaN when this result has none (a threshold that is never crossed). result may be NULL
- * for inputs. */
-double measure_value(int index, const struct ischia_case *c, const struct ischia_result *result);
+/* The number; NaN when there is none (a threshold that is never crossed, inputs without standard
+ * deviations). result may be NULL for inputs, u always. */
+double measure_value(int index, const struct ischia_case *c, const struct ischia_result *result,
+                     const struct ischia_uncertainty *u);
 
 /* The code as part of a FHIR id: '-' for '_', which ids may not have. */
 void measure_id(int index, char ret[MEASURE_ID_BYTES]);

@@ -78,7 +78,8 @@ const char *record_digits(const struct record *record, int measure, char buffer[
     } else if (record->status != ASSESSMENT_SUCCEEDED) {
         return "";
     }
-    const double value = measure_value(measure, c, &record->result);
+    const double value = measure_value(measure, c, &record->result,
+                                       record->has_uncertainty ? &record->uncertainty : NULL);
     return isnan(value) ? "" : text_from_number(value, buffer);
 }
 

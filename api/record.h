@@ -6,6 +6,7 @@
 #include "api/case_doc.h"
 #include "api/risk.h"
 #include "solver/result.h"
+#include "solver/study/uncertainty.h"
 
 /*
  * One assessment as record systems see it: what FHIR resources, HL7 v2 messages and CDS cards are
@@ -40,7 +41,9 @@ struct record {
     char updated_at[ASSESSMENT_TIME_BYTES];
     struct ischia_request request;
     struct origin origin;
-    struct ischia_result result;              /* valid when succeeded */
+    struct ischia_result result; /* valid when succeeded */
+    bool has_uncertainty;
+    struct ischia_uncertainty uncertainty;
     struct risk risk;                         /* likewise             */
     char problem[ISCHIA_ERROR_MESSAGE_BYTES]; /* why it failed; ""                         */
 };

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "api/csv.h"
+#include "api/uncertainty_doc.h"
 
 enum { NAME_BYTES = 48 };
 
@@ -60,18 +61,10 @@ bool uncertainty_csv_has_column(const char *name)
     return false;
 }
 
-/* The input with the largest total index; -1 when eps_max does not vary, or nothing is known. */
-static int largest_index(const struct ischia_uncertainty *u)
-{
-    int largest = -1;
-    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
-        if (isfinite(u->total[i]) && (largest < 0 || u->total[i] > u->total[largest])) largest = i;
-    return largest;
-}
-
 static void put_given(struct text_out *out, const struct ischia_uncertainty *u)
 {
-    const int largest = largest_index(u);
+    enum ischia_param order[ISCHIA_PARAM_COUNT];
+    const int largest = uncertainty_order(u, order) > 0 ? (int)order[0] : -1;
     for (int q = 0; q < UNCERTAIN_COUNT; q++)
         for (int k = 0; k < SHOWN_COUNT; k++) csv_put_number(out, u->quantile[q][shown[k]], false);
     for (int i = 0; i < SHARE_COUNT; i++) {

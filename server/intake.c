@@ -9,6 +9,7 @@
 #include "api/fhir.h"
 #include "api/problem_doc.h"
 #include "api/result_doc.h"
+#include "api/uncertainty_doc.h"
 #include "server/digest.h"
 #include "server/http/documents.h"
 
@@ -161,6 +162,8 @@ enum ischia_code intake_record(struct record *ret, const struct store_assessment
     CHECK(row->result_json != NULL, err, ISCHIA_E_STATE, "the result was not read");
     TRY(result_doc_read(&ret->result, NULL, row->result_json, strlen(row->result_json),
                         &json_limits_stored, err));
+    TRY(uncertainty_doc_read(&ret->uncertainty, &ret->has_uncertainty, row->result_json,
+                             strlen(row->result_json), err));
     risk_assess(&ret->risk, &ret->request.values, &ret->result, LANGUAGE_EN);
     return ISCHIA_OK;
 }

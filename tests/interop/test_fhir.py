@@ -136,7 +136,8 @@ class Fhir(unittest.TestCase):
         self.assertEqual(searched, set(re.findall(r'GET /fhir/([A-Z]\w+) ', listed)))
         operation = self.emit(self.get('OperationDefinition/assess'))
         self.assertEqual(
-            [p['name'] for p in operation['parameter'] if p['type'] == 'Quantity'], list(SIDE)
+            [p['name'] for p in operation['parameter'] if p['type'] == 'Quantity'],
+            [*SIDE, *('sd.' + key for key in SIDE)],
         )
         for path in ('CodeSystem/measure', 'CodeSystem/band', 'CodeSystem/assessment',
                      'StructureDefinition/measure-observation',
@@ -178,6 +179,23 @@ class Fhir(unittest.TestCase):
             found = self.refused(body)
             mine = [i for i in found if i['expression'] == ['Parameters.parameter[0]']]
             self.assertEqual([i['code'] for i in mine], [code], (quantity, found))
+
+    def test_standard_deviations_are_taken(self):
+        body = parameters(F=331)
+        body['parameter'] += [
+            {'name': 'sd.R2', 'valueQuantity': interop.quantity(0.6, 'cm')},
+            {'name': 'sd.F', 'valueQuantity': interop.quantity(20, 'N')},
+            {'name': 'sd.μM', 'valueQuantity': interop.quantity(500, 'Pa')},
+        ]
+        risk = resources(post(self.service, body).json(), 'RiskAssessment')[0]
+        sd = self.service.get('/v1/assessments/' + risk['id']).json()['sd']
+        self.assertEqual({k: v for k, v in sd.items() if v}, {'R2': 6, 'muM': 0.5, 'F': 20})
+        body['parameter'].append({'name': 'sd', 'valueCode': 'usual'})
+        body['parameter'].append({'name': 'sd.R1', 'valueQuantity': {'value': 1}})
+        body['parameter'].append({'name': 'sd.muF', 'valueQuantity': interop.quantity(-1, 'kPa')})
+        count = len(body['parameter'])
+        where = {i['expression'][0] for i in self.refused(body)}
+        self.assertEqual(where, {f'Parameters.parameter[{count - k}]' for k in (3, 2, 1)})
 
     def test_a_bundle_of_observations_is_taken(self):
         answer = post(self.service, bundle(side='right', F=350))

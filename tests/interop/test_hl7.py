@@ -85,6 +85,22 @@ class Hl7(unittest.TestCase):
             answer = self.refused(oru('u-2').replace('|7.1|mm^^UCUM', '|7.1|' + unit), 'AE')
             self.assertIn(code, [e[2] for e in answer[2]], (unit, answer))
 
+    def test_standard_deviations_are_taken(self):
+        def message(control_id, *rows):
+            return oru(control_id, F=332, extra=rows)
+
+        spread = number(9, 'sd.R2', '0.6', 'cm'), number(10, 'sd.F', '20', 'N^^UCUM')
+        self.assertEqual(self.ask(message('sd-1', *spread))[0], 'AA')
+        given = {k: v for k, v in self.last()['sd'].items() if v}
+        self.assertEqual(given, {'R2': 6, 'F': 20})
+        typical = 'OBX|9|ST|sd^^99ISCHIA||typical||||||F'
+        self.assertEqual(self.ask(message('sd-2', typical))[0], 'AA')
+        self.assertEqual(self.last()['sd'], 'typical')
+        unit = number(9, 'sd.R2', '6', '')
+        self.refused(message('sd-3', unit), 'AE', ('OBX^9^6', '101', 'missing'))
+        unknown = number(9, 'sd.eps_max', '6', '1')
+        self.refused(message('sd-4', unknown), 'AE', ('OBX^9^3', '204', 'unknown'))
+
     def test_the_same_control_id_is_one_assessment(self):
         first = oru('twice', F=306)
         self.assertEqual(self.ask(first), ('AA', 'twice', []))

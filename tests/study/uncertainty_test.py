@@ -304,6 +304,34 @@ class ThroughTheService(Intervals):
         page = self.service.get(outside["links"]["report"]).body.decode()
         self.assertIn("No interval: ", page)
 
+    def test_record_systems_get_it(self):
+        units = {"muM": "kPa", "muF": "kPa", "F": "N"}
+
+        def given(name, key, value):
+            unit = units.get(key, "mm")
+            quantity = {"value": value, "system": "http://unitsofmeasure.org", "code": unit}
+            return {"name": name, "valueQuantity": quantity}
+
+        listed = [given(k, k, v) for k, v in CASE.items()]
+        listed += [given("sd." + k, k, v) for k, v in SD.items()]
+        body = json.dumps({"resourceType": "Parameters", "parameter": listed})
+        answer = self.service.ask(
+            "POST", "/fhir/$assess", body.encode(), {"Content-Type": "application/fhir+json"}
+        )
+        found = {}
+        for entry in answer.json()["entry"]:
+            if entry["resource"]["resourceType"] == "Observation":
+                code = entry["resource"]["code"]["coding"][0]["code"]
+                found[code] = entry["resource"]["valueQuantity"]["value"]
+        quantiles = self.uncertainty()["strain"]["eps_max"]
+        self.assertAlmostEqual(found["eps_max_q05"], quantiles[0])
+        self.assertAlmostEqual(found["eps_max_q95"], quantiles[4])
+        again = self.service.get("/v1/assessments?limit=1").json()["items"][0]["id"]
+        path = f"/fhir/Observation/{again}-eps-max-q05"
+        self.assertAlmostEqual(
+            self.service.get(path).json()["valueQuantity"]["value"], quantiles[0]
+        )
+
     def test_lists_as_csv_have_it(self):
         self.ask({**CASE, "sd": SD, "subject": "P-csv"})
         answer = self.service.ask(

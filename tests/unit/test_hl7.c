@@ -116,6 +116,9 @@ static void test_a_request_is_read_back(void **state)
     request.side = ISCHIA_SIDE_RIGHT;
     request.values.resolution = ISCHIA_FINE;
     (void)snprintf(request.label, sizeof request.label, "a|b");
+    request.has_sd = true;
+    request.sd[ISCHIA_R2] = 10.6;
+    request.sd[ISCHIA_F] = 25;
     text_out_init(&out);
     doc_faults_init(&faults);
     hl7_put_request(&out, &sender, &request);
@@ -124,6 +127,8 @@ static void test_a_request_is_read_back(void **state)
     assert_int_equal(input.request.side, ISCHIA_SIDE_RIGHT);
     assert_int_equal(input.request.values.resolution, ISCHIA_FINE);
     assert_string_equal(input.request.label, "a|b");
+    assert_true(input.request.has_sd && !input.request.sd_typical);
+    assert_memory_equal(input.request.sd, request.sd, sizeof request.sd);
     assert_string_equal(input.head.control_id, "17");
     text_out_finish(&out);
 }
