@@ -42,9 +42,9 @@ struct record {
     struct ischia_request request;
     struct origin origin;
     struct ischia_result result; /* valid when succeeded */
-    bool has_uncertainty;
+    struct risk risk;            /* likewise             */
+    bool has_uncertainty;        /* the request gave standard deviations, and it succeeded */
     struct ischia_uncertainty uncertainty;
-    struct risk risk;                         /* likewise             */
     char problem[ISCHIA_ERROR_MESSAGE_BYTES]; /* why it failed; ""                         */
 };
 

@@ -50,9 +50,9 @@ static enum ischia_code carry_out(struct ischia_solver *solver, const struct est
 {
     TRY(timed_solve(solver, &order->c, NULL, &ret->result, NULL, err));
     if (!order->has_sd || !ischia_result_converged(&ret->result)) return ISCHIA_OK;
+    TRY(uncertain_interval(&ret->uncertainty, estimator, &order->c, order->sd, &ret->result, err));
     ret->has_uncertainty = true;
-    return uncertain_interval(&ret->uncertainty, estimator, &order->c, order->sd, &ret->result,
-                              err);
+    return ISCHIA_OK;
 }
 
 static void answer(struct ischia_solver *solver, const struct estimator *estimator,
