@@ -183,7 +183,7 @@ static void accepted_range(enum language language, char *text, size_t size, doub
 static void accepted_models(enum language language, char *text, size_t size)
 {
     char names[64] = "";
-    for (size_t i = 0; i < ischia_preset_count; i++)
+    for (int i = 0; i < ISCHIA_PRESET_COUNT; i++)
         append(names, sizeof names, ischia_presets[i].name);
     (void)words_fill(text, size, language, WORD_DAEMON_FAULT_ACCEPTED_MODEL,
                      WORDS(word_text("names", names)));
@@ -334,7 +334,7 @@ static bool set_resolution(struct ischia_request *request, const char *value)
 
 static bool set_model(struct ischia_request *request, const char *value)
 {
-    for (size_t i = 0; i < ischia_preset_count; i++)
+    for (int i = 0; i < ISCHIA_PRESET_COUNT; i++)
         if (strcmp(value, ischia_presets[i].name) == 0) {
             (void)snprintf(request->preset, sizeof request->preset, "%s", value);
             memcpy(request->values.option, ischia_presets[i].option, sizeof request->values.option);

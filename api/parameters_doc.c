@@ -101,13 +101,13 @@ static void write_preset_group(struct json_out *out, const char *group,
     json_close_object(out);
 }
 
-static const enum word preset_words[] = {WORD_DAEMON_PRESET_DEFAULT,
-                                         WORD_DAEMON_PRESET_PUBLISHED}; /* of ischia_presets */
+static const enum word preset_words[ISCHIA_PRESET_COUNT] = {WORD_DAEMON_PRESET_DEFAULT,
+                                                            WORD_DAEMON_PRESET_PUBLISHED};
 
 static void write_presets(struct json_out *out, enum language language)
 {
     json_open_array(out, "presets");
-    for (size_t i = 0; i < ischia_preset_count; i++) {
+    for (int i = 0; i < ISCHIA_PRESET_COUNT; i++) {
         json_open_object(out, NULL);
         json_put_string(out, "name", ischia_presets[i].name);
         json_put_string(out, "description", words_get(language, preset_words[i]));
@@ -135,15 +135,14 @@ static void write_resolutions(struct json_out *out, enum language language)
 static void write_fields(struct json_out *out, enum language language)
 {
     static const struct {
-        const char *key;
+        const char *key, *pattern;
         enum word description;
-        const char *pattern;
         int max_length;
     } fields[] = {
-        {"subject", WORD_DAEMON_FIELD_SUBJECT, "^[A-Za-z0-9._-]{1,64}$", 64},
-        {"side", WORD_DAEMON_FIELD_SIDE, "^(left|right)$", 5},
-        {"measured_at", WORD_DAEMON_FIELD_MEASURED_AT, NULL, ISCHIA_MEASURED_AT_BYTES - 1},
-        {"label", WORD_DAEMON_FIELD_LABEL, NULL, ISCHIA_LABEL_CHARACTERS_MAX},
+        {"subject", "^[A-Za-z0-9._-]{1,64}$", WORD_DAEMON_FIELD_SUBJECT, 64},
+        {"side", "^(left|right)$", WORD_DAEMON_FIELD_SIDE, 5},
+        {"measured_at", NULL, WORD_DAEMON_FIELD_MEASURED_AT, ISCHIA_MEASURED_AT_BYTES - 1},
+        {"label", NULL, WORD_DAEMON_FIELD_LABEL, ISCHIA_LABEL_CHARACTERS_MAX},
     };
     json_open_array(out, "fields");
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {

@@ -55,20 +55,20 @@ typedef void events_notify(void *context);
 /* Listens to one assessment, whether or not anything was published about it yet. After
  * events_unsubscribe has returned, notify is not running and will not be called. */
 ISCHIA_MUST_CHECK enum ischia_code
-events_subscribe(struct events *events, const struct uuid *topic, events_notify *notify,
-                 void *context, struct events_subscription **ret, struct ischia_error *err);
+events_subscribe(struct events *events, const struct uuid *id, events_notify *notify, void *context,
+                 struct events_subscription **ret, struct ischia_error *err);
 void events_unsubscribe(struct events_subscription *subscription); /* NULL allowed */
 
 /* Copies at most `room` events of the topic with id > after, oldest first; returns how many. */
-size_t events_read(struct events *events, const struct uuid *topic, uint64_t after,
+size_t events_read(struct events *events, const struct uuid *id, uint64_t after,
                    struct event *ret_events, size_t room);
 
 /* The latest progress fraction of a running assessment; false when none is known. */
-bool events_fraction(struct events *events, const struct uuid *topic, double *ret_fraction);
+bool events_fraction(struct events *events, const struct uuid *id, double *ret_fraction);
 
 /* Publishes one event (its id and at_ms are filled in here) and wakes who listens. A full ring
  * drops its oldest. Only an event that nobody listens to can be dropped for want of memory. */
-void events_publish(struct events *events, const struct uuid *topic, const struct event *event);
+void events_publish(struct events *events, const struct uuid *id, const struct event *event);
 
 /* Forgets topics that ended more than `age_ms` ago and have no subscriber. */
 void events_sweep(struct events *events, int64_t age_ms);

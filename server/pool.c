@@ -87,8 +87,8 @@ static void end_render(struct pool *pool, struct render *render, enum ischia_cod
     if (code != ISCHIA_OK) (void)FAIL(&err, code, "%s", reason);
     count(pool, code == ISCHIA_OK ? &pool->stats.renders : &pool->stats.renders_failed);
     render->done(render->context, code,
-                 code == ISCHIA_OK ? (const unsigned char *)drawing->bytes : NULL,
-                 code == ISCHIA_OK ? drawing->size : 0, &err);
+                 drawing != NULL ? (const unsigned char *)drawing->bytes : NULL,
+                 drawing != NULL ? drawing->size : 0, &err);
     render_destroy(render);
 }
 

@@ -166,6 +166,7 @@ static bool allocate(struct assembly *a, const struct mesh *mesh, const struct c
 static enum ischia_code reorder(struct assembly *a, const struct mesh *mesh,
                                 const struct pattern *pattern, struct ischia_error *err)
 {
+    assert(a->n > 0);
     int *order = malloc(sizeof *order * (size_t)a->n), *rank = malloc(sizeof *rank * (size_t)a->n);
     enum ischia_code code;
     if (order != NULL && rank != NULL)

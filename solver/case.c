@@ -27,7 +27,7 @@ const char *const ischia_resolution_names[ISCHIA_RESOLUTION_COUNT] = {
     [ISCHIA_COARSE] = "coarse",
 };
 
-const struct ischia_preset ischia_presets[] = {
+const struct ischia_preset ischia_presets[ISCHIA_PRESET_COUNT] = {
     {"default",
      {[ISCHIA_SKIN_MU] = 67,
       [ISCHIA_SKIN_THICKNESS] = 1,
@@ -45,7 +45,6 @@ const struct ischia_preset ischia_presets[] = {
       [ISCHIA_R2_SURFACE] = 0,
       [ISCHIA_EMBED_OVER_R1] = 1}},
 };
-const size_t ischia_preset_count = sizeof ischia_presets / sizeof ischia_presets[0];
 
 struct ischia_case ischia_case_default(void)
 {

@@ -66,8 +66,8 @@ struct ischia_preset {
     const char *name;
     double option[ISCHIA_OPTION_COUNT];
 };
-extern const struct ischia_preset ischia_presets[];
-extern const size_t ischia_preset_count;
+enum { ISCHIA_PRESET_COUNT = 2 };
+extern const struct ischia_preset ischia_presets[ISCHIA_PRESET_COUNT];
 
 /* Name and version of the mechanical model; results of different versions are never mixed. */
 #define ISCHIA_MODEL_NAME "macron2020-local"

@@ -16,17 +16,15 @@ const char *ischia_code_name(enum ischia_code code)
     return code_names[code];
 }
 
-enum ischia_code ischia_fail(struct ischia_error *err, enum ischia_code code, const char *file,
-                             int line, const char *format, ...)
+void ischia_fail(struct ischia_error *err, enum ischia_code code, const char *file, int line,
+                 const char *format, ...)
 {
-    if (err != NULL) {
-        va_list arguments;
-        err->code = code;
-        err->file = file;
-        err->line = line;
-        va_start(arguments, format);
-        (void)vsnprintf(err->message, sizeof err->message, format, arguments);
-        va_end(arguments);
-    }
-    return code;
+    if (err == NULL) return;
+    va_list arguments;
+    err->code = code;
+    err->file = file;
+    err->line = line;
+    va_start(arguments, format);
+    (void)vsnprintf(err->message, sizeof err->message, format, arguments);
+    va_end(arguments);
 }

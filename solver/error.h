@@ -34,18 +34,18 @@ struct ischia_error {
 /* Short lower-case word for a code ("input", "memory", ...), static storage; never NULL. */
 const char *ischia_code_name(enum ischia_code code);
 
-/*
- * Fills *err (NULL allowed) with a printf-style message and returns code, so that
- * `return ischia_fail(err, ...)` is one statement. Use the FAIL macro, which adds the place.
- */
-__attribute__((format(printf, 5, 6))) enum ischia_code
-ischia_fail(struct ischia_error *err, enum ischia_code code, const char *file, int line,
-            const char *format, ...);
+/* Fills *err (NULL allowed) with a printf-style message. Use FAIL, which adds the place. */
+__attribute__((format(printf, 5, 6))) void ischia_fail(struct ischia_error *err,
+                                                       enum ischia_code code, const char *file,
+                                                       int line, const char *format, ...);
 
 #define ISCHIA_MUST_CHECK __attribute__((warn_unused_result))
 
-/* FAIL(err, code, format, ...): an expression whose value is the code. */
-#define FAIL(err, code, ...) ischia_fail((err), (code), __FILE__, __LINE__, __VA_ARGS__)
+/* FAIL(err, code, format, ...): an expression whose value is the code, so that `return FAIL(...)`
+ * is one statement. The code stands in it twice: a reader of the source (a compiler, an analyzer)
+ * sees without the other file that a failure is not ISCHIA_OK. */
+#define FAIL(err, code, ...)                                                                       \
+    (ischia_fail((err), (code), __FILE__, __LINE__, __VA_ARGS__), (enum ischia_code)(code))
 
 /* CHECK(condition, err, code, format, ...): returns the code when the condition is false. */
 #define CHECK(condition, err, code, ...)                                                           \

@@ -453,7 +453,7 @@ static bool allocate(struct mesh *m)
 {
     const struct mesh_divisions *d = &m->divisions;
     const size_t nodes = (size_t)mesh_local_node_count(d);
-    const size_t n = (size_t)d->across, below = (size_t)(d->fat + d->skin);
+    const size_t n = (size_t)d->across, below = (size_t)d->fat + (size_t)d->skin;
     const size_t muscle = (n * n + 2 * n * (size_t)d->around) * (size_t)d->radial;
     m->X_mm = calloc(nodes, sizeof *m->X_mm);
     m->node_flags = calloc(nodes, sizeof *m->node_flags);

@@ -107,23 +107,23 @@ enum ischia_code newton_create(struct newton **ret, struct body *body, struct as
     return code;
 }
 
-void newton_destroy(struct newton *w)
+void newton_destroy(struct newton *newton)
 {
-    if (w == NULL) return;
-    contact_destroy(w->contact);
-    free(w->force);
-    free(w->bulk);
-    free(w->trial);
-    free(w->saved);
-    free(w->normal_N);
-    free(w->saved_N);
-    free(w->saved_MPa);
-    free(w->border);
-    free(w->reduced);
-    free(w->direction);
-    free(w->keep);
-    free(w->kept);
-    free(w);
+    if (newton == NULL) return;
+    contact_destroy(newton->contact);
+    free(newton->force);
+    free(newton->bulk);
+    free(newton->trial);
+    free(newton->saved);
+    free(newton->normal_N);
+    free(newton->saved_N);
+    free(newton->saved_MPa);
+    free(newton->border);
+    free(newton->reduced);
+    free(newton->direction);
+    free(newton->keep);
+    free(newton->kept);
+    free(newton);
 }
 
 /* --- the state: gradient, Hessian, contact ---------------------------------------------------- */
@@ -638,13 +638,13 @@ enum ischia_code newton_minimise(struct newton *w, struct equilibrium *state,
     return ISCHIA_OK;
 }
 
-void newton_linearise(struct newton *w, const struct equilibrium *state)
+void newton_linearise(struct newton *newton, const struct equilibrium *state)
 {
     const struct newton_control any_scale = {.force_N = 1};
     const double(*u)[3] = (const double(*)[3])state->u_mm;
-    body_reset_pressure(w->body, u);
-    linearise(w, u, 0, &any_scale);
-    w->has_model = false;
+    body_reset_pressure(newton->body, u);
+    linearise(newton, u, 0, &any_scale);
+    newton->has_model = false;
 }
 
 /* The rate of the condensed model with d: its load is what the border brings. The model of the

@@ -354,14 +354,21 @@ static enum ischia_code solve_run(struct solve *s, struct ischia_field *ret_fiel
     return ISCHIA_OK;
 }
 
+static bool are_equal(const double *a, const double *b, int count)
+{
+    int n = 0;
+    while (n < count && a[n] == b[n]) n++;
+    return n == count;
+}
+
 /* The same side and options, but for the force. */
 static bool is_same_side(const struct ischia_case *a, const struct ischia_case *b)
 {
     struct ischia_case as_b = *a;
     as_b.param[ISCHIA_F] = b->param[ISCHIA_F];
     return as_b.resolution == b->resolution &&
-           memcmp(as_b.param, b->param, sizeof as_b.param) == 0 &&
-           memcmp(as_b.option, b->option, sizeof as_b.option) == 0;
+           are_equal(as_b.param, b->param, ISCHIA_PARAM_COUNT) &&
+           are_equal(as_b.option, b->option, ISCHIA_OPTION_COUNT);
 }
 
 /* Takes up the last solve where its path serves the case's force: the same bits, with less work. */

@@ -11,15 +11,17 @@ struct row {
 };
 
 static int compare_sizes(size_t a, size_t b) { return (a > b) - (a < b); }
+static int compare_numbers(double a, double b) { return (a > b) - (a < b); }
 
 /* Any order that brings the rows of a side together, in the order of the design. */
 static int by_case(const void *a, const void *b)
 {
     const struct row *x = a, *y = b;
-    int order = memcmp(x->c.option, y->c.option, sizeof x->c.option);
+    int order = (int)x->c.resolution - (int)y->c.resolution;
+    for (int o = 0; o < ISCHIA_OPTION_COUNT && order == 0; o++)
+        order = compare_numbers(x->c.option[o], y->c.option[o]);
     for (int p = 0; p < ISCHIA_PARAM_COUNT && order == 0; p++)
-        if (p != ISCHIA_F) order = memcmp(&x->c.param[p], &y->c.param[p], sizeof x->c.param[p]);
-    if (order == 0) order = (int)x->c.resolution - (int)y->c.resolution;
+        if (p != ISCHIA_F) order = compare_numbers(x->c.param[p], y->c.param[p]);
     return order != 0 ? order : compare_sizes(x->number, y->number);
 }
 
@@ -34,8 +36,8 @@ static int by_side_and_force(const void *a, const void *b)
 {
     const struct row *x = a, *y = b;
     if (x->first != y->first) return compare_sizes(x->first, y->first);
-    const double F = x->c.param[ISCHIA_F], G = y->c.param[ISCHIA_F];
-    return F != G ? (F > G) - (F < G) : compare_sizes(x->number, y->number);
+    const int order = compare_numbers(x->c.param[ISCHIA_F], y->c.param[ISCHIA_F]);
+    return order != 0 ? order : compare_sizes(x->number, y->number);
 }
 
 static void sort_rows(struct row *row, size_t count)

@@ -165,13 +165,14 @@ static bool find_cards(struct call *call, struct store_feedback *rows,
 static void store_items(struct call *call, const struct cds_feedback *items, size_t count,
                         struct http_response *ret)
 {
-    struct ischia_error err = {.code = ISCHIA_E_MEMORY, .message = "no memory for feedback"};
+    struct ischia_error err;
+    enum ischia_code code = ISCHIA_OK;
     struct store_feedback *rows = calloc(count, sizeof *rows);
     if (rows == NULL)
-        reply_failure(call->request, ret, &err);
-    else if (find_cards(call, rows, items, count, ret) &&
-             store_feedback_add(call->service->store, rows, count, &err) != ISCHIA_OK)
-        reply_failure(call->request, ret, &err);
+        code = FAIL(&err, ISCHIA_E_MEMORY, "no memory for feedback");
+    else if (find_cards(call, rows, items, count, ret))
+        code = store_feedback_add(call->service->store, rows, count, &err);
+    if (code != ISCHIA_OK) reply_failure(call->request, ret, &err);
     free(rows);
 }
 

@@ -57,7 +57,7 @@ static void describe(const struct sockaddr *bound, socklen_t size, char ret[LIST
 static enum ischia_code listen_on(const struct addrinfo *where, int fd,
                                   char ret_address[LISTEN_ADDRESS_BYTES], struct ischia_error *err)
 {
-    struct sockaddr_storage bound;
+    struct sockaddr_storage bound = {0};
     socklen_t size = sizeof bound;
     const int on = 1;
     (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -73,6 +74,7 @@ enum ischia_code reader_take(struct store *store, struct db **ret_db, struct isc
     while (store->idle_readers == NULL && store->reader_count > 0)
         (void)pthread_cond_wait(&store->reader_free, &store->reader_lock);
     struct db *db = store->idle_readers;
+    assert(db != NULL || code != ISCHIA_OK);
     if (db != NULL) {
         store->idle_readers = db->next;
         *ret_db = db;

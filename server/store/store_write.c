@@ -100,6 +100,16 @@ static void finish_batch(struct store *store, struct write *first, struct write 
     }
 }
 
+/* Overwrites what was erased, where the engine leaves that to us; store->scrub stays set when it
+ * could not be done now. */
+static void scrub(struct store *store)
+{
+    if (store->scrub && store->engine->scrub != NULL)
+        store->engine->scrub(store);
+    else
+        store->scrub = false;
+}
+
 static void commit_batch(struct store *store, struct write *first, struct write *end)
 {
     struct ischia_error err = {0};
@@ -115,8 +125,8 @@ static void commit_batch(struct store *store, struct write *first, struct write 
         w->err = err;
     }
     for (struct write *w = first; w != end; w = w->next)
-        store->scrub |= w->erases && w->code == ISCHIA_OK && store->engine->scrub != NULL;
-    if (store->scrub) store->engine->scrub(store);
+        store->scrub |= w->erases && w->code == ISCHIA_OK;
+    scrub(store);
     note_batch(store, first, end);
     finish_batch(store, first, end);
 }
@@ -159,7 +169,7 @@ static void *writer_main(void *argument)
     for (bool closing = false;;) {
         struct write *first = take_waiting(store, &closing);
         if (first == NULL && closing) return NULL;
-        if (first == NULL && store->scrub) store->engine->scrub(store);
+        if (first == NULL) scrub(store);
         while (first != NULL) {
             struct write *end = batch_end(first, store->engine->batch_max);
             commit_batch(store, first, end);

@@ -169,7 +169,7 @@ static bool next_combination(const int *radix, int count, int *number)
 static void put_full(struct sink *sink)
 {
     const struct design *d = sink->design;
-    int number[DESIGN_FACTORS_MAX] = {0}, radix[DESIGN_FACTORS_MAX];
+    int number[DESIGN_FACTORS_MAX] = {0}, radix[DESIGN_FACTORS_MAX] = {0};
     for (int f = 0; f < d->factor_count; f++) radix[f] = d->factor[f].level_count;
     do {
         if (!in_fraction(d, number)) continue;
@@ -182,7 +182,7 @@ static void put_full(struct sink *sink)
 static void put_corners(struct sink *sink)
 {
     const struct design *d = sink->design;
-    int number[DESIGN_FACTORS_MAX] = {0}, radix[DESIGN_FACTORS_MAX];
+    int number[DESIGN_FACTORS_MAX] = {0}, radix[DESIGN_FACTORS_MAX] = {0};
     double x[DESIGN_FACTORS_MAX] = {0};
     for (int f = 0; f < d->factor_count; f++) radix[f] = 2;
     do {

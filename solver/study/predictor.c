@@ -81,7 +81,7 @@ enum ischia_code predictor_reserve(struct predictor *p, int count, struct ischia
     const int stride = (count + PREDICTOR_LANES - 1) / PREDICTOR_LANES * PREDICTOR_LANES;
     CHECK(count >= 0 && count <= PREDICTOR_CENTRES_MAX, err, ISCHIA_E_INPUT,
           "%d centres; at most %d are accepted", count, (int)PREDICTOR_CENTRES_MAX);
-    const size_t coordinates = (size_t)(ISCHIA_PARAM_COUNT + p->group_count);
+    const size_t coordinates = ISCHIA_PARAM_COUNT + (size_t)p->group_count;
     p->centre = calloc((size_t)stride * coordinates + 1, sizeof(double));
     CHECK(p->centre != NULL, err, ISCHIA_E_MEMORY, "out of memory for an emulator");
     p->centre_count = count;

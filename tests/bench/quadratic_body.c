@@ -153,7 +153,8 @@ enum ischia_code body_init(struct body *ret, const struct mesh *mesh,
     CHECK(block != NULL, err, ISCHIA_E_MEMORY, "no blocks of 2 x 2 x 2 elements");
     memcpy(b.material, material, sizeof b.material);
     b.batch_count = (count * PRESSURES + BATCH - 1) / BATCH; /* what pressure_MPa is long by */
-    b.batch = calloc((size_t)count, sizeof(struct quadratic));
+    struct quadratic *element = calloc((size_t)count, sizeof *element);
+    b.batch = (struct element_batch *)(void *)element;
     b.pressure_MPa = calloc((size_t)b.batch_count * BATCH, sizeof *b.pressure_MPa);
     if (b.batch == NULL || b.pressure_MPa == NULL) {
         free(block);
@@ -161,7 +162,7 @@ enum ischia_code body_init(struct body *ret, const struct mesh *mesh,
         return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the elements");
     }
     for (int e = 0; e < count; e++)
-        quadratic_init(&elements_of(&b)[e], mesh, &block[e], &material[block[e].tissue]);
+        quadratic_init(&element[e], mesh, &block[e], &material[block[e].tissue]);
     free(block);
     *ret = b;
     return ISCHIA_OK;

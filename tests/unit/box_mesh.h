@@ -20,7 +20,7 @@ struct box {
 
 static inline void *box_alloc(size_t count, size_t size)
 {
-    void *p = calloc(count, size);
+    void *p = count > 0 ? calloc(count, size) : NULL;
     if (p == NULL) abort();
     return p;
 }

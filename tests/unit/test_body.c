@@ -211,9 +211,9 @@ static void tracked_pressure_is_right_to_first_order(void **state)
     struct bench b;
     bench_init(&b, 0.02);
     const double whole = tracking_error(&b, 0.02), half = tracking_error(&b, 0.01);
+    bench_finish(&b);
     assert_true(whole > 1e-6);
     assert_near(half / whole, 0.25, 0.02);
-    bench_finish(&b);
 }
 
 /* alpha blends the true pressure of the last state with the tracked one. */

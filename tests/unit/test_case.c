@@ -42,10 +42,9 @@ static void tables_are_complete(void **state)
 static void every_preset_is_a_model_that_can_be_solved(void **state)
 {
     (void)state;
-    assert_int_equal(ischia_preset_count, 2);
     assert_string_equal(ischia_presets[1].name, "as-published");
     assert_true(ischia_presets[1].option[ISCHIA_BULK_RATIO] == 100);
-    for (size_t i = 0; i < ischia_preset_count; i++) {
+    for (int i = 0; i < ISCHIA_PRESET_COUNT; i++) {
         struct ischia_case c = row_1R();
         memcpy(c.option, ischia_presets[i].option, sizeof c.option);
         assert_true(ischia_case_is_valid(&c));

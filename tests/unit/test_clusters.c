@@ -78,7 +78,11 @@ static void assert_centroid(const struct ischia_cluster *c, double x, double y, 
 /* Where the integration point of the lower or upper cell of an element lies, from its low side. */
 static double point_offset(int upper) { return upper ? 1 + 1 / sqrt(3.0) : 1 - 1 / sqrt(3.0); }
 
-static double point_at(int i) { return 2.0 * (i / 2) + point_offset(i % 2); }
+static double point_at(int i)
+{
+    const int element = i / 2;
+    return 2.0 * element + point_offset(i % 2);
+}
 
 static void unloaded_muscle_has_no_cluster(void **state)
 {

@@ -25,14 +25,14 @@ static void agrees_with_numpy_and_R(void **state)
         for (int j = 0; j < K; j++) A[j * N + i] = data_number(&file, j);
         y[i] = data_number(&file, K);
     }
-    fclose(file.in);
+    (void)fclose(file.in);
     assert_int_equal(least_squares_init(&fit, A, y, N, K, NULL), ISCHIA_OK);
     const double got[] = {fit.beta[0],     fit.beta[1],        fit.beta[2],     fit.se[0],
                           fit.se[1],       fit.se[2],          fit.mean_square, fit.r2,
                           fit.r2_adjusted, fit.loo_mean_square};
     assert_true(data_open(&file, "regression_expected.csv") && data_next(&file));
     for (int i = 0; i < 10; i++) assert_near(got[i], data_number(&file, i), 1e-12);
-    fclose(file.in);
+    (void)fclose(file.in);
     least_squares_finish(&fit);
 }
 

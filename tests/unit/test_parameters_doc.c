@@ -75,7 +75,7 @@ static void options_presets_and_bands(void **state)
         assert_true(json_number(json_member(element("options", i), "default")) ==
                     ischia_options[i].default_value);
     assert_string_equal(json_string(json_member(element("options", 0), "pointer")), "/skin/mu");
-    assert_int_equal(json_count(json_member(root, "presets")), ischia_preset_count);
+    assert_int_equal(json_count(json_member(root, "presets")), ISCHIA_PRESET_COUNT);
     assert_true(number_in(element("presets", 0), "model", "friction") ==
                 ischia_presets[0].option[ISCHIA_FRICTION]);
     assert_int_equal(json_count(json_member(root, "resolutions")), ISCHIA_RESOLUTION_COUNT);

@@ -57,8 +57,8 @@ static void clients_do_not_share(void **state)
     assert_int_not_equal(rate_take(*state, "d", 1, 1, 1000), 0);
     int refused = 0;
     char client[] = "e0";
-    for (char c = '0'; c <= '9'; c++) {
-        client[1] = c;
+    for (int digit = 0; digit < 10; digit++) {
+        client[1] = (char)('0' + digit);
         refused += rate_take(*state, client, 1, 1, 1000) != 0;
     }
     /* Ten of 8192 slots: a shared one is a chance of 1 in 180, two of them of 1 in 60 000. */

@@ -179,7 +179,10 @@ static void assert_balanced(const char *xml)
         assert_non_null(end);
         if (at[1] == '?') continue;
         if (at[1] == '/') {
-            assert_true(depth > 0);
+            if (depth == 0) {
+                fail_msg("an end without a beginning: %.20s", at);
+                return;
+            }
             depth--;
             assert_int_equal(strncmp(open[depth], at + 2, (size_t)(end - at - 2)), 0);
         } else if (end[-1] != '/') {

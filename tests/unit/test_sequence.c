@@ -24,7 +24,7 @@ static void plain_sequences_agree_with_scipy(void **state)
         assert_near(sequence_sobol(index, dimension, 0), data_number(&file, 2), 1e-9);
         assert_near(sequence_halton(index, dimension, 0), data_number(&file, 3), 1e-15);
     }
-    fclose(file.in);
+    (void)fclose(file.in);
     assert_int_equal(rows, 64 * 14);
 }
 

@@ -35,7 +35,7 @@ static void agrees_with_scipy(void **state)
                      file.word[2], file.word[3], got, expected);
         rows++;
     }
-    fclose(file.in);
+    (void)fclose(file.in);
     assert_int_equal(rows, 235);
 }
 

@@ -24,7 +24,7 @@ static size_t read_sample(const char *name, double *a, double *b)
         a[n] = data_number(&file, 1);
         b[n++] = data_number(&file, 2);
     }
-    fclose(file.in);
+    (void)fclose(file.in);
     return n;
 }
 
@@ -74,7 +74,7 @@ static void agrees_with_scipy(void **state)
         assert_int_equal(s.n, n);
         expect_row(&file, &s);
     }
-    fclose(file.in);
+    (void)fclose(file.in);
     assert_int_equal(samples, 5);
 }
 

@@ -25,10 +25,10 @@ struct problem {
     int divisions[3];
     double param[ISCHIA_PARAM_COUNT];
     unsigned top_flags;
+    int steps;
     double mu_kPa, bulk_ratio;
     double friction;
     double d_mm;
-    int steps;
     double contact_stiffness_MPa_mm, stick_slope_MPa_mm; /* CalculiX's; 0: the exporter's own */
 };
 

@@ -89,7 +89,10 @@ static void mirror_mesh(const struct mesh *quarter, struct mesh *ret)
     ret->hex = calloc((size_t)ret->element_count, sizeof *ret->hex);
     ret->tissue = calloc((size_t)ret->element_count, sizeof *ret->tissue);
     ret->seat_quad = calloc((size_t)ret->seat_quad_count, sizeof *ret->seat_quad);
-    assert_true(ret->X_mm && ret->node_flags && ret->hex && ret->tissue && ret->seat_quad);
+    if (!ret->X_mm || !ret->node_flags || !ret->hex || !ret->tissue || !ret->seat_quad) {
+        fail_msg("not enough memory for the whole body");
+        abort(); /* not reached: fail_msg leaves the test */
+    }
     for (int image = 0; image < 4; image++) {
         mirror_nodes(quarter, image, number, ret);
         mirror_elements(quarter, image, number, ret);
