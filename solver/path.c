@@ -46,16 +46,24 @@ struct path {
     struct path_report *report;
     double target_N; /* of the press that is under way   */
     struct path_effort effort;
-    double ceiling_mm;           /* of the next step                                       */
-    int tries;                   /* steps tried, well or not                               */
-    struct path_report on_way;   /* of the steps that every larger force needs too         */
-    bool started, serves_larger; /* the track's last, ceiling and on_way are such a step's */
+    double ceiling_mm; /* of the next step          */
+    int tries;         /* steps tried, well or not  */
+    bool started;
+    bool left;  /* a step was tried that ends at the target */
+    bool ended; /* before it left */
+    struct {    /* the last step that every larger force needs too, and what goes with it */
+        struct track_memory step;
+        struct path_report report;
+        double ceiling_mm;
+        int tries;
+    } way;
 };
 
 void path_destroy(struct path *p)
 {
     if (p == NULL) return;
     snap_destroy(p->snap);
+    track_memory_finish(&p->way.step);
     track_finish(&p->track);
     free(p);
 }
@@ -95,7 +103,7 @@ static enum ischia_code tell(struct path *p, const struct track_point *now,
                              struct ischia_error *err)
 {
     p->report->load_steps++;
-    p->report->last_force_N = fmax(p->report->last_force_N, fmin(now->force_N, p->target_N));
+    p->report->last_force_N = fmax(p->report->last_force_N, now->force_N);
     if (p->observer == NULL || p->observer->on_step == NULL) return ISCHIA_OK;
     return p->observer->on_step(p->observer->context, p->track.state, err);
 }
@@ -149,14 +157,33 @@ static enum ischia_code try_step(struct path *p, const struct step *step,
     return ISCHIA_OK;
 }
 
+/* Tells that what was told belongs to every larger force too. */
+static void tell_of_way(const struct path *p)
+{
+    if (p->observer != NULL && p->observer->on_leave != NULL)
+        p->observer->on_leave(p->observer->context);
+}
+
 /* A step that leaves for the target leaves the way of larger forces; where it does not arrive,
  * steps are halved that a larger force would have taken whole. */
 static void keep_way(struct path *p, const struct step *step)
 {
-    if (!step->final) return;
-    p->serves_larger = !p->report->left;
-    if (p->serves_larger) p->on_way = *p->report;
-    p->report->left = true;
+    if (!step->final || p->left) return;
+    p->left = true;
+    track_remember(&p->track, &p->way.step);
+    p->way.report = *p->report;
+    p->way.ceiling_mm = p->ceiling_mm;
+    p->way.tries = p->tries;
+    tell_of_way(p);
+}
+
+/* To where the path was before it left. */
+static void take_way(struct path *p)
+{
+    track_recall(&p->track, &p->way.step);
+    *p->report = p->way.report;
+    p->ceiling_mm = p->way.ceiling_mm;
+    p->tries = p->way.tries;
 }
 
 static bool may_go_on(const struct path *p)
@@ -236,7 +263,6 @@ static enum ischia_code follow(struct path *p, struct track_point *ret, struct i
     }
     p->report->reason = p->report->reason < 0 ? p->report->reason : ISCHIA_DIVERGED_STEP;
     p->report->tried = "the load step was halved down to its floor";
-    p->serves_larger = false;
     *ret = p->track.last;
     return ISCHIA_OK;
 }
@@ -245,10 +271,9 @@ static enum ischia_code path_init(struct path *p, struct body *body, struct asse
                                   struct seat *seat, const struct path_effort *effort,
                                   struct equilibrium *state, struct ischia_error *err)
 {
-    *p = (struct path){.effort = *effort,
-                       .ceiling_mm = HUGE_VAL,
-                       .on_way = {.reason = ISCHIA_NOT_STARTED, .tried = ""}};
+    *p = (struct path){.effort = *effort, .ceiling_mm = HUGE_VAL};
     TRY(track_init(&p->track, body, assembly, seat, state, err));
+    TRY(track_memory_init(&p->way.step, &p->track, err));
     return effort->slow_motion ? snap_create(&p->snap, &p->track, err) : ISCHIA_OK;
 }
 
@@ -268,27 +293,52 @@ enum ischia_code path_create(struct path **ret, struct body *body, struct assemb
 
 bool path_serves(const struct path *p, double force_N)
 {
-    return !p->started || (p->serves_larger && force_N >= p->target_N);
+    return !p->started || force_N >= p->target_N;
+}
+
+/* At rest, or where every larger force goes on. */
+static enum ischia_code begin(struct path *p, struct ischia_error *err)
+{
+    p->left = false;
+    if (p->started) {
+        take_way(p);
+        return ISCHIA_OK;
+    }
+    p->started = true;
+    *p->report = (struct path_report){.reason = ISCHIA_NOT_STARTED, .tried = ""};
+    return track_start(&p->track, err);
+}
+
+/* Every larger force ends here too. */
+static void end_on_way(struct path *p)
+{
+    p->ended = true;
+    p->way.report = *p->report;
+    tell_of_way(p);
+}
+
+static enum ischia_code go(struct path *p, struct ischia_error *err)
+{
+    const struct track_point rest = {0};
+    struct track_point end = {0};
+    TRY(begin(p, err));
+    TRY(follow(p, &end, err));
+    p->report->energy_residual = track_lost_Nmm(&rest, &end) / end.work_Nmm;
+    p->report->released = end.drag_Nmm / end.work_Nmm;
+    if (!p->left) end_on_way(p);
+    return ISCHIA_OK;
 }
 
 enum ischia_code path_press(struct path *p, double force_N, const struct path_observer *observer,
                             struct path_report *ret_report, struct ischia_error *err)
 {
-    struct path_report report = p->on_way;
-    const struct track_point rest = {0};
-    struct track_point end = {0};
+    struct path_report report = p->way.report;
     assert(path_serves(p, force_N));
     p->observer = observer;
     p->report = &report;
     p->target_N = force_N;
-    if (p->started)
-        track_restore(&p->track);
-    else
-        TRY(track_start(&p->track, err));
-    p->started = true;
-    TRY(follow(p, &end, err));
-    report.energy_residual = track_lost_Nmm(&rest, &end) / end.work_Nmm;
-    report.released = end.drag_Nmm / end.work_Nmm;
+    if (!p->ended) TRY(go(p, err));
+    report.last_force_N = fmin(report.last_force_N, force_N);
     *ret_report = report;
     return ISCHIA_OK;
 }

@@ -28,22 +28,25 @@ struct path_report {
     double released;        /* in snaps, by the work of drag; relative to the work          */
     double last_force_N;    /* largest force at which a step converged                      */
     const char *tried;      /* when not converged: what was tried, static storage           */
-    bool left; /* a step was tried that ends at the force: before that, none knew of it */
 };
 
-/* Called after every converged load step, the first of them with no load; false cancels. */
+/* on_step is called after every converged load step; on_leave before the first step that ends at
+ * the force, or when the path ends without one: what was told until then belongs to every larger
+ * force too. NULL is allowed for each; false, or an error, ends the path. */
 struct path_observer {
     bool (*on_iteration)(void *context, int load_step, int newton_iteration, double force_N);
     enum ischia_code (*on_step)(void *context, const struct equilibrium *state,
                                 struct ischia_error *err);
+    void (*on_leave)(void *context);
     void *context;
 };
 
 /*
- * A path remembers the last step that every larger force needs too, and goes on from there: a side
+ * The steps on the way know nothing of the force that is wanted in the end. A path remembers the
+ * last of them, before it left for its force, and goes on from there to a larger one, whether it
+ * had arrived or not; a path that ended before it left ends there with any larger force. A side
  * pressed with three forces, the smallest first, costs little more than with the largest alone, and
- * each has the bits that it has from rest. The steps on the way know nothing of the force that is
- * wanted in the end.
+ * each has the bits that it has from rest.
  */
 struct path;
 
@@ -55,7 +58,7 @@ path_create(struct path **ret, struct body *body, struct assembly *assembly, str
 void path_destroy(struct path *path); /* NULL allowed */
 
 /* True when the path can go on to this force (of the quarter model): it has gone nowhere yet, or
- * reached a force that was not larger, at the first attempt of its last step. */
+ * for a force that was not larger. */
 bool path_serves(const struct path *path, double force_N);
 
 /* Presses until the seat carries force_N, which the path serves (asserted); the state ends in the

@@ -68,22 +68,26 @@ void ischia_field_finish(struct ischia_field *field)
 
 /* --- one solve -------------------------------------------------------------------------------- */
 
+/* One attempt, and where a larger force goes on from. */
+struct trial {
+    struct body body;
+    struct seat seat;
+    struct equilibrium state;
+    struct path *path; /* NULL: not begun */
+    struct path_report report;
+    struct ischia_load_point curve[ISCHIA_LOAD_POINTS_MAX];
+    int points, points_on_way; /* of the curve; those that belong to every larger force */
+};
+
 struct solve {
     struct ischia_case c;
     const struct ischia_observer *observer; /* during ischia_solve */
     struct mesh mesh;
-    struct body body;
-    struct seat seat;
-    struct equilibrium state;
     struct assembly *assembly; /* the solver's */
+    struct trial trial[ATTEMPT_COUNT];
     int attempt;
-    struct path *path;         /* of this attempt; NULL: not begun                    */
-    struct path_report report; /* of this attempt                                     */
-    struct path_report before; /* of those given up, together: the work of them alone */
-    bool fails_larger;         /* those given up are given up with any larger force   */
     struct ischia_result result;
-    int points_on_way; /* of the load curve: without the last step's */
-    double fraction;   /* of the progress last reported */
+    double fraction; /* of the progress last reported */
 };
 
 static bool is_sound(const struct path_report *report)
@@ -91,20 +95,18 @@ static bool is_sound(const struct path_report *report)
     return report->reason > 0 && fabs(report->energy_residual) <= energy_residual_max;
 }
 
-/* What an attempt made. */
-static void leave_attempt(struct solve *s)
+static void trial_finish(struct trial *t)
 {
-    path_destroy(s->path);
-    s->path = NULL;
-    seat_finish(&s->seat);
-    body_finish(&s->body);
+    path_destroy(t->path);
+    seat_finish(&t->seat);
+    body_finish(&t->body);
+    free(t->state.u_mm);
 }
 
 static void solve_destroy(struct solve *s)
 {
     if (s == NULL) return;
-    leave_attempt(s);
-    free(s->state.u_mm);
+    for (int a = 0; a < ATTEMPT_COUNT; a++) trial_finish(&s->trial[a]);
     mesh_finish(&s->mesh);
     free(s);
 }
@@ -146,8 +148,6 @@ static enum ischia_code solve_init(struct solve *s, struct ischia_solver *solver
     if (!solver->has_assembly[r]) TRY(assembly_init(&solver->assembly[r], &s->mesh, err));
     solver->has_assembly[r] = true;
     s->assembly = &solver->assembly[r];
-    s->state.u_mm = calloc((size_t)s->mesh.node_count, sizeof *s->state.u_mm);
-    CHECK(s->state.u_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the displacements");
     return ISCHIA_OK;
 }
 
@@ -169,11 +169,10 @@ static bool report_iteration(void *context, int load_step, int newton_iteration,
 }
 
 /* Forces rise along a load curve; a point that does not fit, or does not rise, is left out. */
-static void add_load_point(struct ischia_result *r, const struct ischia_load_point *point)
+static void add_load_point(struct trial *t, const struct ischia_load_point *point)
 {
-    const double last_N = r->load_curve_count > 0 ? r->load_curve[r->load_curve_count - 1].F_N : 0;
-    if (r->load_curve_count < ISCHIA_LOAD_POINTS_MAX && point->F_N > last_N)
-        r->load_curve[r->load_curve_count++] = *point;
+    const double last_N = t->points > 0 ? t->curve[t->points - 1].F_N : 0;
+    if (t->points < ISCHIA_LOAD_POINTS_MAX && point->F_N > last_N) t->curve[t->points++] = *point;
 }
 
 /* One point of the load curve. */
@@ -191,9 +190,14 @@ static enum ischia_code record_step(void *context, const struct equilibrium *sta
                                            .eps_max = axis.eps_max,
                                            .E_shear_max = most.green_lagrange_shear,
                                            .E_comp_max = most.green_lagrange_compression};
-    s->points_on_way = s->result.load_curve_count;
-    add_load_point(&s->result, &load);
+    add_load_point(&s->trial[s->attempt], &load);
     return ISCHIA_OK;
+}
+
+static void record_leave(void *context)
+{
+    struct solve *s = context;
+    s->trial[s->attempt].points_on_way = s->trial[s->attempt].points;
 }
 
 /* Force at which a measure of the load curve first crosses its threshold, linear between steps. */
@@ -211,10 +215,10 @@ static double crossing_N(const struct ischia_result *r, size_t offset, double th
     return (double)NAN;
 }
 
-static void measure_axis(struct solve *s)
+static void measure_axis(struct solve *s, const struct equilibrium *state)
 {
     struct ischia_result *r = &s->result;
-    const struct axis_strain axis = axis_strain_of(&s->mesh, (const double(*)[3])s->state.u_mm);
+    const struct axis_strain axis = axis_strain_of(&s->mesh, (const double(*)[3])state->u_mm);
     r->strain.eps_max = axis.eps_max;
     r->strain.eps_max_depth_mm = axis.depth_mm;
     r->numerics.eps_max_error =
@@ -224,10 +228,11 @@ static void measure_axis(struct solve *s)
 static enum ischia_code measure(struct solve *s, struct ischia_error *err)
 {
     struct ischia_result *r = &s->result;
-    const struct seat_state seat = {&s->state.u_mm[0][0], s->seat.normal_N};
+    const struct trial *t = &s->trial[s->attempt];
+    const struct seat_state seat = {&t->state.u_mm[0][0], t->seat.normal_N};
     struct strain_field field;
-    measure_axis(s);
-    TRY(strain_field_init(&field, &s->mesh, &s->state.u_mm[0][0], err));
+    measure_axis(s, &t->state);
+    TRY(strain_field_init(&field, &s->mesh, seat.displacement_mm, err));
     const struct strain_measures most = strain_muscle_maxima(&s->mesh, &field);
     r->strain.E_shear_max = most.green_lagrange_shear;
     r->strain.E_comp_max = most.green_lagrange_compression;
@@ -239,7 +244,7 @@ static enum ischia_code measure(struct solve *s, struct ischia_error *err)
     enum ischia_code code = clusters_find_all(&s->mesh, &field, r->clusters, err);
     strain_field_finish(&field);
     TRY(code);
-    r->seat.displacement_mm = s->state.d_mm;
+    r->seat.displacement_mm = t->state.d_mm;
     return seat_pressure(&s->mesh, &seat, &r->seat, err);
 }
 
@@ -247,9 +252,10 @@ static enum ischia_code measure(struct solve *s, struct ischia_error *err)
 static void judge(struct solve *s)
 {
     struct ischia_numerics *n = &s->result.numerics;
-    n->det_F_min = body_det_F_min(&s->body, (const double(*)[3])s->state.u_mm);
+    const struct trial *t = &s->trial[s->attempt];
+    n->det_F_min = body_det_F_min(&t->body, (const double(*)[3])t->state.u_mm);
     if (n->reason < 0) return;
-    if (!(n->det_F_min > 0) || !is_sound(&s->report)) {
+    if (!(n->det_F_min > 0) || !is_sound(&t->report)) {
         n->reason = ISCHIA_DIVERGED_CHECKS;
         (void)snprintf(n->detail, sizeof n->detail,
                        "det F is %.3g at the least (> 0 wanted), the energy balance is off by %.2g "
@@ -261,10 +267,11 @@ static void judge(struct solve *s)
 /* What a result says of an attempt that was not the first. */
 static void tell_attempt(const struct solve *s, char *ret_text, size_t size)
 {
+    const double released = s->trial[s->attempt].report.released;
     char snaps[80] = "";
-    if (s->report.released > 0)
+    if (released > 0)
         (void)snprintf(snaps, sizeof snaps, "; snaps in slow motion released %.2g %% of the work",
-                       100 * s->report.released);
+                       100 * released);
     (void)snprintf(ret_text, size, "solved with the corners of elements weighing %g, not %g%s",
                    attempts[s->attempt].corner_share, attempts[0].corner_share, snaps);
 }
@@ -272,7 +279,10 @@ static void tell_attempt(const struct solve *s, char *ret_text, size_t size)
 static void take_reports(struct solve *s)
 {
     struct ischia_numerics *n = &s->result.numerics;
-    const struct path_report *report = &s->report;
+    const struct trial *t = &s->trial[s->attempt];
+    const struct path_report *report = &t->report;
+    s->result.load_curve_count = t->points;
+    memcpy(s->result.load_curve, t->curve, sizeof t->curve);
     n->reason = report->reason;
     n->elements = s->mesh.element_count;
     n->dof = s->assembly->n + 1;
@@ -280,8 +290,10 @@ static void take_reports(struct solve *s)
     n->force_residual = report->force_residual;
     n->energy_residual = report->energy_residual;
     n->last_converged_F_N = side_force_N(report->last_force_N);
-    n->newton_iterations = s->before.newton_iterations + report->newton_iterations;
-    n->factorisations = s->before.factorisations + report->factorisations;
+    for (int a = 0; a <= s->attempt; a++) {
+        n->newton_iterations += s->trial[a].report.newton_iterations;
+        n->factorisations += s->trial[a].report.factorisations;
+    }
     (void)snprintf(n->detail, sizeof n->detail, "%s", report->tried);
     if (is_sound(report) && s->attempt > 0) tell_attempt(s, n->detail, sizeof n->detail);
 }
@@ -289,56 +301,46 @@ static void take_reports(struct solve *s)
 static enum ischia_code keep_field(const struct solve *s, struct ischia_field *ret,
                                    struct ischia_error *err)
 {
+    const double *u_mm = &s->trial[s->attempt].state.u_mm[0][0];
     const size_t numbers = 3 * (size_t)s->mesh.node_count;
     ret->displacement_mm = malloc(numbers * sizeof *ret->displacement_mm);
     CHECK(ret->displacement_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the field");
-    memcpy(ret->displacement_mm, s->state.u_mm, numbers * sizeof *ret->displacement_mm);
+    memcpy(ret->displacement_mm, u_mm, numbers * sizeof *ret->displacement_mm);
     ret->node_count = (size_t)s->mesh.node_count;
     return ISCHIA_OK;
 }
 
 /* At rest, with the materials of an attempt. */
-static enum ischia_code begin_attempt(struct solve *s, struct ischia_error *err)
+static enum ischia_code trial_begin(struct trial *t, const struct solve *s,
+                                    const struct attempt *attempt, struct ischia_error *err)
 {
-    const struct attempt *attempt = &attempts[s->attempt];
-    struct equilibrium *state = &s->state;
     struct element_material material[TISSUE_COUNT];
-    memset(state->u_mm, 0, sizeof *state->u_mm * (size_t)s->mesh.node_count);
-    *state = (struct equilibrium){.u_mm = state->u_mm};
-    s->result.load_curve_count = 0;
-    leave_attempt(s);
     set_materials(&s->c, attempt->corner_share, material);
-    TRY(body_init(&s->body, &s->mesh, material, err));
-    TRY(seat_init(&s->seat, &s->mesh, s->c.option[ISCHIA_FRICTION], err));
-    return path_create(&s->path, &s->body, s->assembly, &s->seat, &attempt->effort, state, err);
+    t->state.u_mm = calloc((size_t)s->mesh.node_count, sizeof *t->state.u_mm);
+    CHECK(t->state.u_mm != NULL, err, ISCHIA_E_MEMORY, "not enough memory for the displacements");
+    TRY(body_init(&t->body, &s->mesh, material, err));
+    TRY(seat_init(&t->seat, &s->mesh, s->c.option[ISCHIA_FRICTION], err));
+    return path_create(&t->path, &t->body, s->assembly, &t->seat, &attempt->effort, &t->state, err);
 }
 
-/* The work of the attempts before counts with the path's own. */
-static enum ischia_code press(struct solve *s, struct ischia_error *err)
+/* From rest, or from where the attempt left for a smaller force. */
+static enum ischia_code press(struct solve *s, struct trial *t, struct ischia_error *err)
 {
-    const struct path_observer observer = {report_iteration, record_step, s};
-    return path_press(s->path, quarter_force_N(s->c.param[ISCHIA_F]), &observer, &s->report, err);
-}
-
-/* Steps that have not left for the force are those of any larger one, and so is their failure. */
-static void give_up(struct solve *s)
-{
-    s->before.newton_iterations += s->report.newton_iterations;
-    s->before.factorisations += s->report.factorisations;
-    s->fails_larger = s->fails_larger && !s->report.left;
-    leave_attempt(s);
-    s->attempt++;
+    const struct path_observer observer = {report_iteration, record_step, record_leave, s};
+    if (t->path == NULL) TRY(trial_begin(t, s, &attempts[s->attempt], err));
+    t->points = t->points_on_way;
+    return path_press(t->path, quarter_force_N(s->c.param[ISCHIA_F]), &observer, &t->report, err);
 }
 
 static enum ischia_code solve_attempts(struct solve *s, struct ischia_error *err)
 {
-    for (;; give_up(s)) {
-        if (s->path == NULL) TRY(begin_attempt(s, err));
-        TRY(press(s, err));
-        if (is_sound(&s->report)) return ISCHIA_OK;
-        if (s->attempt + 1 == ATTEMPT_COUNT) break;
+    for (s->attempt = 0; s->attempt < ATTEMPT_COUNT; s->attempt++) {
+        struct trial *t = &s->trial[s->attempt];
+        TRY(press(s, t, err));
+        if (is_sound(&t->report)) return ISCHIA_OK;
     }
-    s->report.tried = attempts_tried;
+    s->attempt--;
+    s->trial[s->attempt].report.tried = attempts_tried;
     return ISCHIA_OK;
 }
 
@@ -371,29 +373,15 @@ static bool is_same_side(const struct ischia_case *a, const struct ischia_case *
            are_equal(as_b.option, b->option, ISCHIA_OPTION_COUNT);
 }
 
-/* Takes up the last solve where its path serves the case's force: the same bits, with less work. */
+/* Takes up the last solve for the same side with no smaller force: the same bits, less work. */
 static bool takes_up(struct solve *last, const struct ischia_case *c)
 {
-    if (last == NULL || !last->fails_larger || !is_same_side(&last->c, c) ||
-        !path_serves(last->path, quarter_force_N(c->param[ISCHIA_F])))
+    if (last == NULL || !is_same_side(&last->c, c) || c->param[ISCHIA_F] < last->c.param[ISCHIA_F])
         return false;
-    const struct ischia_result before = last->result;
     last->c = *c;
     last->fraction = 0;
-    last->result = (struct ischia_result){.load_curve_count = last->points_on_way};
-    memcpy(last->result.load_curve, before.load_curve, sizeof before.load_curve);
+    last->result = (struct ischia_result){0};
     return true;
-}
-
-/* Attempts that the last solve gave up and that this case would give up just so: they are not made
- * again. Their work counts as if they had been. */
-static void skip_attempts(struct solve *s, const struct solve *last)
-{
-    if (last == NULL || !last->fails_larger || !is_same_side(&last->c, &s->c) ||
-        s->c.param[ISCHIA_F] < last->c.param[ISCHIA_F])
-        return;
-    s->attempt = last->attempt;
-    s->before = last->before;
 }
 
 /* The solver's solve, ready for a case. */
@@ -404,8 +392,6 @@ static enum ischia_code solve_begin(struct ischia_solver *solver, const struct i
     struct solve *s = calloc(1, sizeof *s);
     CHECK(s != NULL, err, ISCHIA_E_MEMORY, "not enough memory for a solve");
     s->c = *c;
-    s->fails_larger = true;
-    skip_attempts(s, solver->last);
     ischia_solver_forget(solver);
     solver->last = s;
     return solve_init(s, solver, err);

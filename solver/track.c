@@ -12,18 +12,39 @@ static const double small_force_N = 7.5;
 static const double small_work_N = 0.75;
 static const double small_most = 20;
 
+/* --- tangents --------------------------------------------------------------------------------- */
+
+static bool tangent_allocate(struct newton_tangent *tangent, size_t nodes)
+{
+    tangent->direction = calloc(nodes, sizeof *tangent->direction);
+    tangent->normal_rate_N_mm = calloc(nodes, sizeof *tangent->normal_rate_N_mm);
+    return tangent->direction != NULL && tangent->normal_rate_N_mm != NULL;
+}
+
+static void tangent_free(struct newton_tangent *tangent)
+{
+    free(tangent->direction);
+    free(tangent->normal_rate_N_mm);
+}
+
+static void tangent_copy(struct newton_tangent *to, const struct newton_tangent *from, size_t nodes)
+{
+    to->stiffness_N_mm = from->stiffness_N_mm;
+    memcpy(to->direction, from->direction, sizeof *to->direction * nodes);
+    memcpy(to->normal_rate_N_mm, from->normal_rate_N_mm, sizeof *to->normal_rate_N_mm * nodes);
+}
+
+/* --- steps ------------------------------------------------------------------------------------ */
+
 static bool allocate(struct track *t)
 {
     const size_t nodes = (size_t)t->nodes;
     t->u_mm = calloc(nodes, sizeof *t->u_mm);
-    t->tangent.direction = calloc(nodes, sizeof *t->tangent.direction);
-    t->tangent.normal_rate_N_mm = calloc(nodes, sizeof *t->tangent.normal_rate_N_mm);
     t->normal_N = calloc(nodes, sizeof *t->normal_N);
     t->anchor_mm = calloc(nodes, sizeof *t->anchor_mm);
-    t->ahead.direction = calloc(nodes, sizeof *t->ahead.direction);
-    t->ahead.normal_rate_N_mm = calloc(nodes, sizeof *t->ahead.normal_rate_N_mm);
-    return t->u_mm && t->tangent.direction && t->tangent.normal_rate_N_mm && t->normal_N &&
-           t->anchor_mm && t->ahead.direction && t->ahead.normal_rate_N_mm;
+    const bool tangents =
+        tangent_allocate(&t->tangent, nodes) && tangent_allocate(&t->ahead, nodes);
+    return t->u_mm && t->normal_N && t->anchor_mm && tangents;
 }
 
 enum ischia_code track_init(struct track *ret, struct body *body, struct assembly *assembly,
@@ -51,12 +72,10 @@ void track_finish(struct track *t)
 {
     newton_destroy(t->newton);
     free(t->u_mm);
-    free(t->tangent.direction);
-    free(t->tangent.normal_rate_N_mm);
     free(t->normal_N);
     free(t->anchor_mm);
-    free(t->ahead.direction);
-    free(t->ahead.normal_rate_N_mm);
+    tangent_free(&t->tangent);
+    tangent_free(&t->ahead);
     *t = (struct track){0};
 }
 
@@ -104,6 +123,59 @@ void track_restore(struct track *t)
     t->state->force_N = t->last.force_N;
     newton_linearise(t->newton, t->state);
 }
+
+/* --- memory ----------------------------------------------------------------------------------- */
+
+enum ischia_code track_memory_init(struct track_memory *ret, const struct track *t,
+                                   struct ischia_error *err)
+{
+    const size_t nodes = (size_t)t->nodes;
+    struct track_memory m = {.u_mm = calloc(nodes, sizeof *m.u_mm),
+                             .normal_N = calloc(nodes, sizeof *m.normal_N),
+                             .anchor_mm = calloc(nodes, sizeof *m.anchor_mm)};
+    const bool tangents = tangent_allocate(&m.tangent, nodes) && tangent_allocate(&m.ahead, nodes);
+    if (!m.u_mm || !m.normal_N || !m.anchor_mm || !tangents) {
+        track_memory_finish(&m);
+        return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for a load step");
+    }
+    *ret = m;
+    return ISCHIA_OK;
+}
+
+void track_memory_finish(struct track_memory *m)
+{
+    free(m->u_mm);
+    free(m->normal_N);
+    free(m->anchor_mm);
+    tangent_free(&m->tangent);
+    tangent_free(&m->ahead);
+    *m = (struct track_memory){0};
+}
+
+void track_remember(const struct track *t, struct track_memory *m)
+{
+    const size_t nodes = (size_t)t->nodes;
+    m->last = t->last;
+    memcpy(m->u_mm, t->u_mm, sizeof *t->u_mm * nodes);
+    memcpy(m->normal_N, t->normal_N, sizeof *t->normal_N * nodes);
+    memcpy(m->anchor_mm, t->anchor_mm, sizeof *t->anchor_mm * nodes);
+    tangent_copy(&m->tangent, &t->tangent, nodes);
+    tangent_copy(&m->ahead, &t->ahead, nodes);
+}
+
+void track_recall(struct track *t, const struct track_memory *m)
+{
+    const size_t nodes = (size_t)t->nodes;
+    t->last = m->last;
+    memcpy(t->u_mm, m->u_mm, sizeof *t->u_mm * nodes);
+    memcpy(t->normal_N, m->normal_N, sizeof *t->normal_N * nodes);
+    memcpy(t->anchor_mm, m->anchor_mm, sizeof *t->anchor_mm * nodes);
+    tangent_copy(&t->tangent, &m->tangent, nodes);
+    tangent_copy(&t->ahead, &m->ahead, nodes);
+    track_restore(t);
+}
+
+/* --- scales ----------------------------------------------------------------------------------- */
 
 static double error_scale(double now, double small)
 {

@@ -65,6 +65,24 @@ ISCHIA_MUST_CHECK enum ischia_code track_weigh(struct track *track, double drag_
                                                struct track_point *ret, struct ischia_error *err);
 void track_weigh_slow(struct track *track, double drag_Nmm, struct track_point *ret);
 
+/* A copy of the last step, to go back to when the track has gone on. `ahead` is part of it: a step
+ * whose equilibrium is not stable has no tangent (newton.h), and leaves there what it found. */
+struct track_memory {
+    struct track_point last;
+    double (*u_mm)[3];
+    struct newton_tangent tangent, ahead;
+    double *normal_N;
+    double (*anchor_mm)[2];
+};
+
+/* Room for a track's steps. ISCHIA_E_MEMORY. */
+ISCHIA_MUST_CHECK enum ischia_code
+track_memory_init(struct track_memory *ret, const struct track *track, struct ischia_error *err);
+void track_memory_finish(struct track_memory *memory); /* a zeroed one is allowed */
+void track_remember(const struct track *track, struct track_memory *memory);
+/* The step is the last one again, and the state with it. */
+void track_recall(struct track *track, const struct track_memory *memory);
+
 /* Goes on from a weighed step: it is the last one now; its tangent with it, or the old one kept. */
 void track_book(struct track *track, const struct track_point *now);
 void track_book_slow(struct track *track, const struct track_point *now);

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "solver/path.h"
+#include "solver/track.h"
 #include "tests/unit/near.h"
 #include "tests/verification/bodies.h"
 
@@ -62,7 +63,8 @@ static const struct path_effort slow_effort = {.pace = 0.5, .factorisations_max 
 static enum ischia_code follow(struct bench *b, double force_N, struct log *log,
                                struct path_report *ret_report, struct ischia_error *err)
 {
-    const struct path_observer observer = {on_iteration, on_step, log};
+    const struct path_observer observer = {
+        .on_iteration = on_iteration, .on_step = on_step, .context = log};
     return path_follow(&b->body, &b->assembly, &b->seat, force_N, &usual_effort,
                        log != NULL ? &observer : NULL, &b->state, ret_report, err);
 }
@@ -161,6 +163,62 @@ static void a_path_goes_on_to_larger_forces(void **state)
     bench_finish(&a);
 }
 
+static void fill(struct track *t, double with)
+{
+    for (int n = 0; n < t->nodes; n++) {
+        t->normal_N[n] = t->tangent.normal_rate_N_mm[n] = t->ahead.normal_rate_N_mm[n] = with + n;
+        for (int c = 0; c < 3; c++) {
+            t->u_mm[n][c] = 1e-3 * sin(with + n + c); /* a body that can be: it is linearised */
+            t->tangent.direction[n][c] = t->ahead.direction[n][c] = with * (c - 1) + n;
+        }
+        for (int c = 0; c < 2; c++) t->anchor_mm[n][c] = with - n - c;
+    }
+    t->last = (struct track_point){with, 2 * with, 3, 4, 5, 6, 7};
+    t->tangent.stiffness_N_mm = 8 * with;
+    t->ahead.stiffness_N_mm = 9 * with;
+}
+
+static void assert_same_numbers(const void *a, const void *b, size_t per_node,
+                                const struct track *t)
+{
+    assert_memory_equal(a, b, per_node * sizeof(double) * (size_t)t->nodes);
+}
+
+/* All that the next step goes on with: the buffer of a tangent that may not be found, too. */
+static void a_memory_holds_the_whole_step(void **state)
+{
+    (void)state;
+    struct bench a, b;
+    struct track one, other;
+    struct track_memory memory;
+    bench_make(&a);
+    bench_make(&b);
+    assert_int_equal(track_init(&one, &a.body, &a.assembly, &a.seat, &a.state, NULL), ISCHIA_OK);
+    assert_int_equal(track_init(&other, &b.body, &b.assembly, &b.seat, &b.state, NULL), ISCHIA_OK);
+    assert_int_equal(track_memory_init(&memory, &one, NULL), ISCHIA_OK);
+    fill(&one, 0.25);
+    fill(&other, 0.25);
+    track_remember(&one, &memory);
+    fill(&one, 0.5);
+    track_recall(&one, &memory);
+    assert_memory_equal(&one.last, &other.last, sizeof one.last);
+    assert_same_numbers(one.u_mm, other.u_mm, 3, &one);
+    assert_same_numbers(one.state->u_mm, other.u_mm, 3, &one);
+    assert_same_numbers(one.normal_N, other.normal_N, 1, &one);
+    assert_same_numbers(one.anchor_mm, other.anchor_mm, 2, &one);
+    assert_same_numbers(one.tangent.direction, other.tangent.direction, 3, &one);
+    assert_same_numbers(one.tangent.normal_rate_N_mm, other.tangent.normal_rate_N_mm, 1, &one);
+    assert_same_numbers(one.ahead.direction, other.ahead.direction, 3, &one);
+    assert_same_numbers(one.ahead.normal_rate_N_mm, other.ahead.normal_rate_N_mm, 1, &one);
+    assert_true(one.tangent.stiffness_N_mm == other.tangent.stiffness_N_mm);
+    assert_true(one.ahead.stiffness_N_mm == other.ahead.stiffness_N_mm);
+    track_memory_finish(&memory);
+    track_finish(&one);
+    track_finish(&other);
+    bench_finish(&a);
+    bench_finish(&b);
+}
+
 /* A path that takes more factorisations than it may ends short, and says so. */
 static void a_path_ends_at_its_limit_of_work(void **state)
 {
@@ -225,6 +283,7 @@ int main(void)
         cmocka_unit_test(watching_changes_nothing),
         cmocka_unit_test(a_slower_pace_takes_more_steps),
         cmocka_unit_test(a_path_goes_on_to_larger_forces),
+        cmocka_unit_test(a_memory_holds_the_whole_step),
         cmocka_unit_test(a_path_ends_at_its_limit_of_work),
         cmocka_unit_test(observers_end_the_path),
         cmocka_unit_test(what_cannot_be_reached_has_a_reason),

@@ -47,24 +47,37 @@ class Body:
         """The deck says it."""
 
 
-def green_lagrange(nodes, u):
-    """Green-Lagrange strains of a hexahedron at CalculiX's 2 x 2 x 2 points: xx yy zz xy xz yz."""
+def points():
+    """CalculiX's 2 x 2 x 2 points of a hexahedron, in its order."""
     a = 1 / 3 ** 0.5
-    for t in (-a, a):
-        for s in (-a, a):
-            for r in (-a, a):
-                yield strain_at(nodes, u, (r, s, t))
+    return [(r, s, t) for t in (-a, a) for s in (-a, a) for r in (-a, a)]
+
+
+def green_lagrange(nodes, u):
+    """Green-Lagrange strains of a hexahedron at those points: xx yy zz xy xz yz."""
+    for xi in points():
+        yield strain_at(nodes, u, xi)
+
+
+def volumes(nodes):
+    """The volume that belongs to each of those points."""
+    for xi in points():
+        yield determinant(slopes_and_jacobian(nodes, xi)[1])
 
 
 SIGNS = [(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1),
          (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)]
 
 
-def strain_at(nodes, u, xi):
+def slopes_and_jacobian(nodes, xi):
     slopes = [[s[c] / 8 * product(1 + s[k] * xi[k] for k in range(3) if k != c) for c in range(3)]
               for s in SIGNS]
-    jacobian = [[sum(x[i] * d[j] for x, d in zip(nodes, slopes)) for j in range(3)]
-                for i in range(3)]
+    return slopes, [[sum(x[i] * d[j] for x, d in zip(nodes, slopes)) for j in range(3)]
+                    for i in range(3)]
+
+
+def strain_at(nodes, u, xi):
+    slopes, jacobian = slopes_and_jacobian(nodes, xi)
     gradient = [[sum(v[i] * d[j] for v, d in zip(u, slopes)) for j in range(3)] for i in range(3)]
     h = multiply(gradient, inverse(jacobian))
     e = [[(h[i][j] + h[j][i] + sum(h[k][i] * h[k][j] for k in range(3))) / 2 for j in range(3)]
@@ -83,12 +96,19 @@ def multiply(a, b):
     return [[sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
 
 
+def cofactors(m):
+    return [[m[(j + 1) % 3][(i + 1) % 3] * m[(j + 2) % 3][(i + 2) % 3] -
+             m[(j + 1) % 3][(i + 2) % 3] * m[(j + 2) % 3][(i + 1) % 3] for j in range(3)]
+            for i in range(3)]
+
+
+def determinant(m):
+    return sum(m[0][k] * row[0] for k, row in enumerate(cofactors(m)))
+
+
 def inverse(m):
-    cofactor = [[m[(j + 1) % 3][(i + 1) % 3] * m[(j + 2) % 3][(i + 2) % 3] -
-                 m[(j + 1) % 3][(i + 2) % 3] * m[(j + 2) % 3][(i + 1) % 3] for j in range(3)]
-                for i in range(3)]
-    determinant = sum(m[0][k] * cofactor[k][0] for k in range(3))
-    return [[c / determinant for c in row] for row in cofactor]
+    det = determinant(m)
+    return [[c / det for c in row] for row in cofactors(m)]
 
 
 def largest_difference(a, b):
