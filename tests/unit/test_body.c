@@ -224,7 +224,8 @@ static void partial_steps_blend_pressures(void **state)
     bench_init(&b, 0);
     shake(&b, 0.1);
     body_reset_pressure(&b.body, at(&b));
-    const double truth = b.body.pressure_MPa[3];
+    /* The analyzer forgets b.u, which bench_finish frees, when &b.body is handed on. */
+    const double truth = b.body.pressure_MPa[3]; /* NOLINT(clang-analyzer-unix.Malloc) */
     assert_true(fabs(truth) > 1e-4);
     (void)body_linearise(&b.body, &b.assembly, at(&b), 0, &b.d);
     b.body.pressure_MPa[3] = 2;
