@@ -219,6 +219,32 @@ static void a_memory_holds_the_whole_step(void **state)
     bench_finish(&b);
 }
 
+/* A path that ends before it leaves for its force ends there with a larger one, without work. */
+static void a_path_that_ended_stays_there(void **state)
+{
+    (void)state;
+    const struct path_effort little = {.pace = 1, .factorisations_max = 6};
+    struct log log = {.cancel_at_iteration = 0, .fail_at_step = 0}; /* any call would be an error */
+    const struct path_observer observer = {
+        .on_iteration = on_iteration, .on_step = on_step, .context = &log};
+    struct path_report first, larger;
+    struct bench b;
+    struct path *path;
+    bench_make(&b);
+    assert_int_equal(path_create(&path, &b.body, &b.assembly, &b.seat, &little, &b.state, NULL),
+                     ISCHIA_OK);
+    assert_int_equal(path_press(path, 3, NULL, &first, NULL), ISCHIA_OK);
+    assert_true(first.reason < 0 && first.last_force_N > 0);
+    assert_int_equal(path_press(path, 4, &observer, &larger, NULL), ISCHIA_OK);
+    assert_int_equal(log.iterations + log.steps, 0);
+    assert_int_equal(larger.reason, first.reason);
+    assert_int_equal(larger.factorisations, first.factorisations);
+    assert_true(larger.last_force_N == first.last_force_N);
+    assert_true(larger.energy_residual == first.energy_residual);
+    path_destroy(path);
+    bench_finish(&b);
+}
+
 /* A path that takes more factorisations than it may ends short, and says so. */
 static void a_path_ends_at_its_limit_of_work(void **state)
 {
@@ -284,6 +310,7 @@ int main(void)
         cmocka_unit_test(a_slower_pace_takes_more_steps),
         cmocka_unit_test(a_path_goes_on_to_larger_forces),
         cmocka_unit_test(a_memory_holds_the_whole_step),
+        cmocka_unit_test(a_path_that_ended_stays_there),
         cmocka_unit_test(a_path_ends_at_its_limit_of_work),
         cmocka_unit_test(observers_end_the_path),
         cmocka_unit_test(what_cannot_be_reached_has_a_reason),
