@@ -72,6 +72,24 @@ export function assert_clean(page) {
   assert.deepEqual(page.seen, { foreign: [], errors: [], violations: [] });
 }
 
+/* The form can be used within so many ms of an instant of the page's own visit (requestStart,
+ * responseStart): in one of as many visits as a machine needs that does other things too. */
+export async function assert_usable_within(page, most_ms, from) {
+  const times = [];
+  while (times.length < 40 && !(Math.min(...times) < most_ms)) {
+    await page.reload();
+    await page.locator('fieldset.side').first().waitFor();
+    times.push(
+      await page.evaluate((start) => {
+        const [visit] = performance.getEntriesByType('navigation');
+        const [limits] = performance.getEntriesByName(`${location.origin}/v1/parameters`);
+        return limits.responseEnd - visit[start];
+      }, from),
+    );
+  }
+  assert.ok(Math.min(...times) < most_ms, `${times.map(Math.round)} ms`);
+}
+
 /* No WCAG 2.2 AA violation, nor of axe's best practices, on the page as it stands. */
 export async function assert_accessible(page, what) {
   await page.evaluate(axe_source);

@@ -226,6 +226,7 @@ test('the list pages through what is older', async () => {
 test('the report prints on one A4 page a side and says what it must', async () => {
   await compute('P-5');
   await all_ended(2);
+  await page.locator('.report .ids', { hasText: 'Ischia' }).nth(1).waitFor({ state: 'attached' });
   const { pages, is_a4, text, bytes } = await on_paper(page);
   assert.deepEqual([pages, is_a4], [2, true]);
   for (const part of [

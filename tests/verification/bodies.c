@@ -85,13 +85,17 @@ enum ischia_code bench_init(struct bench *b, const struct element_material mater
     TRY(newton_create(&b->newton, &b->body, &b->assembly, &b->seat, err));
     b->state.u_mm = calloc((size_t)b->mesh.node_count, sizeof *b->state.u_mm);
     b->normal_before_N = calloc((size_t)b->mesh.node_count, sizeof *b->normal_before_N);
-    CHECK(b->state.u_mm != NULL && b->normal_before_N != NULL, err, ISCHIA_E_MEMORY,
-          "not enough memory for the state");
+    b->ahead = calloc((size_t)b->mesh.node_count, sizeof *b->ahead);
+    b->normal_rate_N_mm = calloc((size_t)b->mesh.node_count, sizeof *b->normal_rate_N_mm);
+    CHECK(b->state.u_mm && b->normal_before_N && b->ahead && b->normal_rate_N_mm, err,
+          ISCHIA_E_MEMORY, "not enough memory for the state");
     return ISCHIA_OK;
 }
 
 void bench_finish(struct bench *b)
 {
+    free(b->normal_rate_N_mm);
+    free(b->ahead);
     free(b->normal_before_N);
     free(b->state.u_mm);
     newton_destroy(b->newton);
@@ -101,11 +105,27 @@ void bench_finish(struct bench *b)
     mesh_finish(&b->mesh);
 }
 
+/* The tissue is taken along by the tangent of the last equilibrium. */
 static void move_bone(struct bench *b, double d_mm)
 {
+    const double by_mm = d_mm - b->state.d_mm;
     b->state.d_mm = d_mm;
-    for (int n = 0; n < b->mesh.node_count; n++)
-        if (b->mesh.node_flags[n] & (NODE_ON_BONE | NODE_ON_PLATE)) b->state.u_mm[n][2] = -d_mm;
+    for (int n = 0; n < b->mesh.node_count; n++) {
+        double *u_mm = b->state.u_mm[n];
+        for (int c = 0; c < 3; c++) u_mm[c] += by_mm * b->ahead[n][c];
+        if (b->mesh.node_flags[n] & NODE_ON_SEAT) seat_stop(&b->mesh, n, u_mm);
+        if (b->mesh.node_flags[n] & (NODE_ON_BONE | NODE_ON_PLATE)) u_mm[2] = -d_mm;
+    }
+}
+
+static enum ischia_code look_ahead(struct bench *b, struct ischia_error *err)
+{
+    struct newton_tangent tangent = {.direction = b->ahead,
+                                     .normal_rate_N_mm = b->normal_rate_N_mm};
+    TRY(newton_tangent(b->newton, &b->state, &tangent, err));
+    if (tangent.stiffness_N_mm == 0)
+        memset(b->ahead, 0, sizeof *b->ahead * (size_t)b->mesh.node_count);
+    return ISCHIA_OK;
 }
 
 /* In two halves, from the state given: a step that is too far at once. */
@@ -129,6 +149,8 @@ enum ischia_code bench_press(struct bench *b, double d_mm, struct ischia_error *
         code = FAIL(err, ISCHIA_E_MEMORY, "not enough memory for a step");
         goto out;
     }
+    if (d_mm > before_mm && before_mm > 0) code = look_ahead(b, err);
+    if (code != ISCHIA_OK) goto out;
     memcpy(u, b->state.u_mm, nodes * sizeof *u);
     memcpy(normal_N, b->seat.normal_N, nodes * sizeof *normal_N);
     move_bone(b, d_mm);

@@ -21,6 +21,8 @@ struct bench {
     struct newton *newton;
     struct equilibrium state;
     double *normal_before_N; /* [node] contact forces at the end of the last step */
+    double (*ahead)[3];      /* [node] du/dd at the last equilibrium, which the next starts along */
+    double *normal_rate_N_mm; /* [node] of the contact forces, the same */
 };
 
 /* Fills a zeroed bench whose mesh is already there, one material for each tissue. On error call

@@ -135,8 +135,8 @@ static void sliding_block_carries_mu_N(void **state)
     }
     seat_forces(&b, &tangential, &normal);
     assert_true(fabs(tangential) < 0.01 * friction * normal);
-    for (int s = 0; s < 40; s++) {
-        for (int n = 0; n < b.mesh.node_count; n++) b.seat.anchor_mm[n][0] += 0.2;
+    for (int s = 0; s < 80; s++) {
+        for (int n = 0; n < b.mesh.node_count; n++) b.seat.anchor_mm[n][0] += 0.1;
         must(bench_press(&b, 1, &err), &err);
         (void)bench_end_step(&b);
     }
