@@ -48,9 +48,13 @@ strain_field_init(struct strain_field *ret, const struct mesh *mesh, const doubl
                   struct ischia_error *err);
 void strain_field_finish(struct strain_field *field); /* a zeroed one is allowed */
 
-/* The largest of each measure over the integration points of the muscle. */
-struct strain_measures strain_muscle_maxima(const struct mesh *mesh,
-                                            const struct strain_field *field);
+/* The largest Green-Lagrange strains over the integration points of the muscle: the bits of the
+ * field's own maxima, a third of its work. displacement_mm as for the field. */
+struct strain_maxima {
+    double green_lagrange_shear;
+    double green_lagrange_compression;
+};
+struct strain_maxima strain_muscle_maxima(const struct mesh *mesh, const double *displacement_mm);
 
 /* Unloaded muscle volume of the quarter model. */
 double strain_muscle_volume_mm3(const struct mesh *mesh, const struct strain_field *field);
