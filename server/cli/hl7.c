@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* ischia hl7: one side as HL7 v2, and over MLLP to a port, as a record system would send it. */
 #include <errno.h>
-#include <netdb.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,6 +13,7 @@
 #include "server/cli/files.h"
 #include "server/cli/options.h"
 #include "server/cli/run.h"
+#include "server/hl7/address.h"
 #include "server/hl7/mllp.h"
 
 enum { ANSWER_WITHIN_MS = 60 * 1000, READ_BYTES = 4096 };
@@ -70,27 +70,18 @@ static enum ischia_code read_message(const char *path, char **ret, size_t *ret_s
 
 static enum ischia_code dial(const char *address, int *ret_fd, struct ischia_error *err)
 {
-    char host[256];
-    const struct addrinfo hints = {.ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM};
-    struct addrinfo *where = NULL;
-    const char *colon = strrchr(address, ':');
-    const bool bracket = address[0] == '[';
-    const size_t length = colon == NULL ? 0 : (size_t)(colon - address);
-    CHECK(length > (bracket ? 2U : 0U) && length < sizeof host, err, ISCHIA_E_INPUT,
-          "'%.80s' is not HOST:PORT", address);
-    (void)snprintf(host, sizeof host, "%.*s", (int)(bracket ? length - 2 : length),
-                   address + bracket);
-    const int cause = getaddrinfo(host, colon + 1, &hints, &where);
-    CHECK(cause == 0, err, ISCHIA_E_INPUT, "%.80s: %s", address, gai_strerror(cause));
-    int fd = -1;
-    for (const struct addrinfo *a = where; fd < 0 && a != NULL; a = a->ai_next) {
+    struct address peer;
+    int fd = -1, cause = 0;
+    TRY(address_find(address, &peer, err));
+    for (const struct addrinfo *a = peer.where; fd < 0 && a != NULL; a = a->ai_next) {
         fd = socket(a->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-        if (fd < 0 || connect(fd, a->ai_addr, a->ai_addrlen) == 0) continue;
-        (void)close(fd);
+        if (fd >= 0 && connect(fd, a->ai_addr, a->ai_addrlen) == 0) break;
+        cause = errno;
+        if (fd >= 0) (void)close(fd);
         fd = -1;
     }
-    freeaddrinfo(where);
-    CHECK(fd >= 0, err, ISCHIA_E_IO, "cannot connect to %.80s: %s", address, strerror(errno));
+    address_finish(&peer);
+    CHECK(fd >= 0, err, ISCHIA_E_IO, "cannot connect to %.80s: %s", address, strerror(cause));
     *ret_fd = fd;
     return ISCHIA_OK;
 }

@@ -4,7 +4,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <gnutls/gnutls.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -14,6 +13,8 @@
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
+
+#include "server/hl7/address.h"
 
 struct link_tls {
     gnutls_certificate_credentials_t credentials;
@@ -164,24 +165,14 @@ static bool connect_to(const struct addrinfo *where, int *ret_fd, int timeout_ms
 enum ischia_code link_connect(struct link **ret, const char *address, struct link_tls *tls,
                               int timeout_ms, struct ischia_error *err)
 {
-    char host[256];
-    const struct addrinfo hints = {.ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM};
-    struct addrinfo *where = NULL;
-    const char *colon = strrchr(address, ':');
-    const bool bracket = address[0] == '[';
-    const size_t length = colon == NULL ? 0 : (size_t)(colon - address);
-    CHECK(length > (bracket ? 2U : 0U) && length < sizeof host, err, ISCHIA_E_INPUT,
-          "'%.80s' is not HOST:PORT", address);
-    (void)snprintf(host, sizeof host, "%.*s", (int)(bracket ? length - 2 : length),
-                   address + bracket);
-    const int cause = getaddrinfo(host, colon + 1, &hints, &where);
-    CHECK(cause == 0, err, ISCHIA_E_IO, "%.80s: %s", address, gai_strerror(cause));
+    struct address peer;
     int fd = -1;
-    for (const struct addrinfo *a = where; fd < 0 && a != NULL; a = a->ai_next)
+    TRY(address_find(address, &peer, err));
+    for (const struct addrinfo *a = peer.where; fd < 0 && a != NULL; a = a->ai_next)
         (void)connect_to(a, &fd, timeout_ms);
-    freeaddrinfo(where);
+    address_finish(&peer);
     CHECK(fd >= 0, err, ISCHIA_E_IO, "cannot connect to %.80s", address);
-    return open_link(ret, fd, tls, host, timeout_ms, err);
+    return open_link(ret, fd, tls, peer.host, timeout_ms, err);
 }
 
 void link_close(struct link *link)

@@ -178,8 +178,8 @@ static void tangent_is_the_derivative_of_equilibria(void **state)
     bench_finish(&b);
 }
 
-/* How far the tangent of the last step is from a fresh one, at 2 mm: of the stiffness, relative, and
- * of the direction at the most. */
+/* How far the tangent of the last step is from a fresh one, at 2 mm: of the stiffness, relative,
+ * and of the direction at the most. */
 struct staleness {
     double stiffness, direction;
 };
