@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a solve costs: runs the benchmarks of a release build and writes docs/PERFORMANCE.md and
-docs/performance/scale.svg from what they print. Some ten minutes on a quiet machine.
+docs/performance/scale.svg from what they print. Three quarters of an hour on a quiet machine, most
+of it CalculiX's.
 
 usage: performance.py [--build DIR] [--from FILE | --only PART]   FILE: kept by an earlier run
 
@@ -9,6 +10,7 @@ Python's standard library only. Measurements stay in docs/performance/measured.j
 page can be written again without measuring.
 """
 import argparse
+import csv
 import json
 import math
 import os
@@ -49,6 +51,7 @@ CALCULIX_CASES = (
       "model": {"bulk_ratio": 2000}, "resolution": "standard"}),
 )
 CALCULIX_LIMIT_S = 400
+SIDE_LIMIT_S = 150  # for each side of Table 2, coarse
 
 
 # ---- measuring ----
@@ -109,18 +112,32 @@ def timed(work):
     return children_cpu_s() - since, said
 
 
-def calculix(program):
+def against_calculix(program, case, limit_s):
     """CPU seconds of both programs for the same case on the same mesh, and why CalculiX failed."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "case.json")
+        file.write_text(json.dumps(case), encoding="utf-8")
+        deck = "\n".join(lines_of([program, "export", "--inp", file]))
+        ours, _ = timed(lambda: lines_of([program, "solve", file]))
+        theirs, why = timed(lambda: ccx.run(deck, limit_s))
+    return {"ischia_s": ours, "calculix_s": theirs, "failed": why}
+
+
+def calculix(program):
+    return [{"case": name, **against_calculix(program, {**MODERATE, **change}, CALCULIX_LIMIT_S)}
+            for name, change in CALCULIX_CASES]
+
+
+def calculix_sides(program):
+    """The same for every side of Table 2 as it is, on the coarse mesh."""
+    with open(TABLE2, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
     found = []
-    for name, change in CALCULIX_CASES:
-        with tempfile.TemporaryDirectory() as folder:
-            case = Path(folder, "case.json")
-            case.write_text(json.dumps({**MODERATE, **change}), encoding="utf-8")
-            deck = "\n".join(lines_of([program, "export", "--inp", case]))
-            ours, _ = timed(lambda: lines_of([program, "solve", case]))
-            theirs, why = timed(lambda: ccx.run(deck, CALCULIX_LIMIT_S))
-        found.append({"case": name, "ischia_s": ours, "calculix_s": theirs, "failed": why})
-    return found
+    for row in rows:
+        case = {key.split("_")[0]: float(row[key]) for key in row if key not in ("subject", "side")}
+        found.append({"side": row["subject"].removeprefix("table2-") + row["side"][0].upper(),
+                      **against_calculix(program, {**case, "resolution": "coarse"}, SIDE_LIMIT_S)})
+    return {"machine": machine(), "sides": found}
 
 
 def growth(build):
@@ -145,12 +162,27 @@ def machine():
     return f"{model}, {os.cpu_count()} processors" + (", AVX-512" if "avx512f" in text else "")
 
 
-def measure(build):
-    program = build / "server/cli/ischia"
-    return {"machine": machine(), "cold": solves(build), "warm": solves(build, "-w"),
-            "kernels": kernels(build), "workers_s": workers(program), "growth": growth(build),
-            "elements": elements(build),
-            "calculix": calculix(program)}
+def of_program(measure_with):
+    return lambda build: measure_with(build / "server/cli/ischia")
+
+
+def elsewhere(build):
+    return {"machine": machine(), "cold": solves(build), "warm": solves(build, "-w")}
+
+
+# What a run measures, in this order; --only takes one of them, or `elsewhere`: Table 2 on another
+# machine than that of the rest.
+PARTS = {
+    "machine": lambda build: machine(),
+    "cold": solves,
+    "warm": lambda build: solves(build, "-w"),
+    "kernels": kernels,
+    "workers_s": of_program(workers),
+    "growth": growth,
+    "elements": elements,
+    "calculix": of_program(calculix),
+    "calculix_sides": of_program(calculix_sides),
+}
 
 
 # ---- the page ----
@@ -212,6 +244,31 @@ def calculix_lines(rows):
         yield f"| {r['case']} | {r['ischia_s']:.2f} | {r['calculix_s']:.0f} | {said} |"
 
 
+def elsewhere_text(found):
+    cold, warm = totals(found["cold"]), totals(found["warm"])
+    rest = f"{cold[0]:.2f}, {cold[1]:.2f} and {cold[2]:.2f} s"
+    after = f"{warm[0]:.2f}, {warm[1]:.2f} and {warm[2]:.2f} s"
+    return f"""
+The same on another machine ({found['machine']}):
+{rest} from rest, {after} after 0.9 of the force.
+"""
+
+
+def sides_text(found):
+    arrived = [r for r in found["sides"] if not r["failed"]]
+    ratios = [r["calculix_s"] / r["ischia_s"] for r in arrived]
+    reasons = {}
+    for r in found["sides"]:
+        reasons.setdefault(r["failed"], []).append(r["side"])
+    lost = "; ".join(f"{why}: {', '.join(sides)}" for why, sides in reasons.items() if why)
+    return f"""
+Every side of Table 2 as it is, on the coarse mesh, at most {SIDE_LIMIT_S} s of CalculiX's time
+({found['machine']}): it finishes {len(arrived)} of {len(found['sides'])}, in {min(ratios):.0f} to {max(ratios):.0f}
+times Ischia's CPU time (median {statistics.median(ratios):.0f}), and does not finish the others.
+{lost[:1].upper() + lost[1:]}.
+"""
+
+
 def element_cell(row):
     if row["arrived"] != "yes":
         return f"not in {row['factorisations']} | {row['cpu_s']}"
@@ -271,7 +328,7 @@ Going on gives the bits of a solve from rest (decision 20; test_solver). Peak me
 The floor: a side takes {number:.0f} factorisations (median) of {one_ms:.0f} ms each; its time is
 {floor_ratio(m['cold']):.1f} times that of five. What holds the rest is the number of load steps, eleven to
 fifteen, of two to three factorisations each; longer steps fail and are halved (decision 20).
-
+{elsewhere_text(m["elsewhere"]) if "elsewhere" in m else ""}
 ## Growth with the mesh
 
 `bench_scale 1R`: one side on five meshes of one shape.
@@ -305,26 +362,22 @@ The same deck that `ischia export --inp` writes, on one thread; CalculiX 2.20, a
 | case | Ischia | CalculiX | CalculiX over Ischia |
 |---|---|---|---|
 """
-    return text + "\n".join(calculix_lines(m["calculix"])) + "\n" + elements_text(m["elements"])
+    text += "\n".join(calculix_lines(m["calculix"])) + "\n"
+    return text + sides_text(m["calculix_sides"]) + elements_text(m["elements"])
 
 
 def main():
     parse = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parse.add_argument("--build", type=Path, default=ROOT / "build/release")
     parse.add_argument("--from", dest="kept", type=Path)
-    parse.add_argument("--only", choices=("calculix", "growth", "elements"),
+    parse.add_argument("--only", choices=[*PARTS, "elsewhere"],
                        help="measure this part alone, keep the rest")
     a = parse.parse_args()
-    if a.kept:
-        measured = json.loads(a.kept.read_text(encoding="utf-8"))
-    else:
-        if a.only:
-            measured = json.loads(KEPT.read_text(encoding="utf-8"))
-            measured[a.only] = {"calculix": lambda: calculix(a.build.resolve() / "server/cli/ischia"),
-                                "growth": lambda: growth(a.build.resolve()),
-                                "elements": lambda: elements(a.build.resolve())}[a.only]()
-        else:
-            measured = measure(a.build.resolve())
+    kept = a.kept or KEPT
+    measured = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+    if not a.kept:
+        for part in [a.only] if a.only else PARTS:
+            measured[part] = (PARTS.get(part) or elsewhere)(a.build.resolve())
         KEPT.parent.mkdir(exist_ok=True)
         KEPT.write_text(json.dumps(measured, indent=1) + "\n", encoding="utf-8")
     PICTURE.write_text(draw(measured["growth"]), encoding="utf-8")

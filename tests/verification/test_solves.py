@@ -76,12 +76,11 @@ class Quick(unittest.TestCase):
     def test_neighbours_and_jobs_do_not_change_a_row(self):
         rows = [[table2()[name][k] for k in KEYS] for name in ("1R", "7L", "9L")]
         runs = []
-        for order, jobs in ((rows, 1), (rows, 2), (rows[::-1], 1)):
+        for order, jobs in ((rows, 1), (rows[::-1], 2)):
             found, done = cohort(order, jobs)
             self.assertEqual(done.returncode, 0, done.stderr)
             runs.append(sorted(tuple(v for k, v in row.items() if k != "wall_s") for row in found))
         self.assertEqual(runs[0], runs[1])
-        self.assertEqual(runs[0], runs[2])
 
     def test_a_later_attempt_says_so(self):
         """Corners of Table 1 whose paths do not arrive with the usual rule, on the coarse mesh. Which
