@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a solve costs: runs the benchmarks of a release build and writes docs/PERFORMANCE.md and
-docs/performance/scale.svg from what they print. Three quarters of an hour on a quiet machine, most
-of it CalculiX's.
+docs/performance/scale.svg from what they print. Some ten minutes on a quiet machine, and about as
+long again for CalculiX on every side of Table 2.
 
 usage: performance.py [--build DIR] [--from FILE | --only PART]   FILE: kept by an earlier run
 

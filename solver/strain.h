@@ -49,7 +49,7 @@ strain_field_init(struct strain_field *ret, const struct mesh *mesh, const doubl
 void strain_field_finish(struct strain_field *field); /* a zeroed one is allowed */
 
 /* The largest Green-Lagrange strains over the integration points of the muscle: the bits of the
- * field's own maxima, a third of its work. displacement_mm as for the field. */
+ * field's own maxima, without the field. displacement_mm as for it. */
 struct strain_maxima {
     double green_lagrange_shear;
     double green_lagrange_compression;
