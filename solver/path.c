@@ -52,7 +52,7 @@ struct path {
     bool left;  /* a step was tried that ends at the target */
     bool ended; /* before it left */
     struct {    /* the last step that every larger force needs too, and what goes with it */
-        struct track_memory step;
+        struct track_step step;
         struct path_report report;
         double ceiling_mm;
         int tries;
@@ -63,7 +63,7 @@ void path_destroy(struct path *p)
 {
     if (p == NULL) return;
     snap_destroy(p->snap);
-    track_memory_finish(&p->way.step);
+    track_step_finish(&p->way.step);
     track_finish(&p->track);
     free(p);
 }
@@ -78,7 +78,7 @@ static bool watch(void *context, const struct newton_report *report, double forc
 
 static double step_mm(const struct path *p, const struct track_point *now)
 {
-    return now->d_mm - p->track.last.d_mm;
+    return now->d_mm - p->track.last.at.d_mm;
 }
 
 static bool is_short(const struct path *p, const struct track_point *now)
@@ -89,7 +89,7 @@ static bool is_short(const struct path *p, const struct track_point *now)
 static bool keeps_energy(const struct path *p, const struct track_point *now)
 {
     const double scale_Nmm = track_work_scale_Nmm(&p->track, now->work_Nmm);
-    return fabs(track_lost_Nmm(&p->track.last, now)) <= lost_share_max * scale_Nmm;
+    return fabs(track_lost_Nmm(&p->track.last.at, now)) <= lost_share_max * scale_Nmm;
 }
 
 /* The first step has no work to compare with yet, and a real snap loses energy at any length. */
@@ -120,13 +120,14 @@ static double step_ceiling_mm(const struct path *p)
 {
     if (p->report->load_steps == 0) return first_step * p->track.height_mm;
     return p->effort.pace * fmin(step_of_height * p->track.height_mm,
-                                 step_of_remaining * (p->track.height_mm - p->track.last.d_mm));
+                                 step_of_remaining * (p->track.height_mm - p->track.last.at.d_mm));
 }
 
 /* By the tangent; under force control when that would reach the target. */
 static struct step next_step(struct path *p, double ceiling_mm)
 {
-    const double missing_N = p->target_N - p->track.last.force_N, k = p->track.last.stiffness_N_mm;
+    const double missing_N = p->target_N - p->track.last.at.force_N,
+                 k = p->track.last.at.stiffness_N_mm;
     struct step step = {.dd_mm = fmin(ceiling_mm, step_ceiling_mm(p))};
     step.final = k > 0 && missing_N <= stiffening * k * step.dd_mm;
     if (step.final) step.dd_mm = fmin(step.dd_mm, missing_N / k);
@@ -139,7 +140,7 @@ static enum ischia_code try_step(struct path *p, const struct step *step,
 {
     const bool snapping = step->dd_mm < snap_step * p->track.height_mm;
     const double predicted_N =
-        p->track.last.force_N + fmax(p->track.last.stiffness_N_mm, 0) * step->dd_mm;
+        p->track.last.at.force_N + fmax(p->track.last.at.stiffness_N_mm, 0) * step->dd_mm;
     const struct newton_control on_the_way = {.force_N = track_force_scale_N(predicted_N),
                                               .tolerance = path_tolerance,
                                               .iterations_max = snapping ? SNAP_ITERATIONS_MAX
@@ -206,15 +207,15 @@ static enum ischia_code follow_snap(struct path *p, const struct step *step, boo
 {
     struct track *t = &p->track;
     struct snap_report snap;
-    const double from_mm = t->last.d_mm;
+    const double from_mm = t->last.at.d_mm;
     track_restore(t);
     TRY(snap_follow(p->snap, t, step->dd_mm, SNAP_FACTORISATIONS_MAX, watch, p, &snap, err));
     p->report->newton_iterations += snap.newton_iterations;
     p->report->factorisations += snap.factorisations;
-    p->ceiling_mm = fmax(2 * (t->last.d_mm - from_mm), after_snap * t->height_mm);
+    p->ceiling_mm = fmax(2 * (t->last.at.d_mm - from_mm), after_snap * t->height_mm);
     *ret_stuck = !snap.arrived;
     if (!snap.arrived) p->report->reason = ISCHIA_DIVERGED_STEP;
-    return snap.arrived ? tell(p, &t->last, err) : ISCHIA_OK;
+    return snap.arrived ? tell(p, &t->last.at, err) : ISCHIA_OK;
 }
 
 enum outcome { STEP_FAILED, STEP_SNAPPED, STEP_STANDS };
@@ -239,7 +240,7 @@ static enum ischia_code weigh_step(struct path *p, const struct step *step,
 static void halve(struct path *p, const struct step *step)
 {
     struct track *t = &p->track;
-    p->ceiling_mm = fmin(step->dd_mm, t->state->d_mm - t->last.d_mm) / 2;
+    p->ceiling_mm = fmin(step->dd_mm, t->state->d_mm - t->last.at.d_mm) / 2;
     track_restore(t);
 }
 
@@ -263,7 +264,7 @@ static enum ischia_code follow(struct path *p, struct track_point *ret, struct i
     }
     p->report->reason = p->report->reason < 0 ? p->report->reason : ISCHIA_DIVERGED_STEP;
     p->report->tried = "the load step was halved down to its floor";
-    *ret = p->track.last;
+    *ret = p->track.last.at;
     return ISCHIA_OK;
 }
 
@@ -273,7 +274,7 @@ static enum ischia_code path_init(struct path *p, struct body *body, struct asse
 {
     *p = (struct path){.effort = *effort, .ceiling_mm = HUGE_VAL};
     TRY(track_init(&p->track, body, assembly, seat, state, err));
-    TRY(track_memory_init(&p->way.step, &p->track, err));
+    TRY(track_step_init(&p->way.step, p->track.nodes, err));
     return effort->slow_motion ? snap_create(&p->snap, &p->track, err) : ISCHIA_OK;
 }
 

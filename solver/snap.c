@@ -97,7 +97,7 @@ static void move_by_rate(const struct slow *w, double share)
     struct track *t = w->track;
     for (int n = 0; n < t->nodes; n++) {
         for (int c = 0; c < 3; c++)
-            t->state->u_mm[n][c] = t->u_mm[n][c] + share * w->snap->rate[n][c] / w->stiffness;
+            t->state->u_mm[n][c] = t->last.u_mm[n][c] + share * w->snap->rate[n][c] / w->stiffness;
         if (t->body->mesh->node_flags[n] & NODE_ON_SEAT)
             seat_stop(t->body->mesh, n, t->state->u_mm[n]);
     }
@@ -112,8 +112,9 @@ static void predict(const struct slow *w)
         move_by_rate(w, share);
         if (track_is_uninverted(t)) break;
     }
-    if (share <= 0.01) memcpy(t->state->u_mm, t->u_mm, sizeof *t->u_mm * (size_t)t->nodes);
-    body_track_pressure(t->body, 1, (const double(*)[3])t->u_mm,
+    if (share <= 0.01)
+        memcpy(t->state->u_mm, t->last.u_mm, sizeof *t->last.u_mm * (size_t)t->nodes);
+    body_track_pressure(t->body, 1, (const double(*)[3])t->last.u_mm,
                         (const double(*)[3])t->state->u_mm);
 }
 
@@ -127,8 +128,8 @@ static enum ischia_code minimise(struct slow *w, bool free, newton_observe *obse
                                  struct newton_report *ret, struct ischia_error *err)
 {
     struct track *t = w->track;
-    const struct newton_drag drag = {w->snap->spring_N_mm, (const double(*)[3])t->u_mm};
-    const struct newton_control control = {.force_N = track_force_scale_N(t->last.force_N),
+    const struct newton_drag drag = {w->snap->spring_N_mm, (const double(*)[3])t->last.u_mm};
+    const struct newton_control control = {.force_N = track_force_scale_N(t->last.at.force_N),
                                            .tolerance = free ? free_tolerance : slow_tolerance,
                                            .iterations_max = ITERATIONS_MAX,
                                            .drag = free ? NULL : &drag};
@@ -148,7 +149,7 @@ static double find_rate(struct slow *w, bool free)
     double work = 0;
     for (int n = 0; n < s->nodes; n++)
         for (int c = 0; c < 3; c++) {
-            const double move = t->state->u_mm[n][c] - t->u_mm[n][c];
+            const double move = t->state->u_mm[n][c] - t->last.u_mm[n][c];
             if (!is_free(t, n, c)) continue;
             s->now[n][c] = free ? 0 : w->stiffness * move;
             work += s->c_N_mm[n] * (s->rate[n][c] + s->now[n][c]) / 2 * move;
@@ -167,7 +168,7 @@ static enum ischia_code weigh(struct slow *w, bool free, struct track_point *ret
 
 static double share_of_work(const struct slow *w, double energy_Nmm)
 {
-    return fabs(energy_Nmm) / track_work_scale_Nmm(w->track, w->track->last.work_Nmm);
+    return fabs(energy_Nmm) / track_work_scale_Nmm(w->track, w->track->last.at.work_Nmm);
 }
 
 static double rate_norm(const struct snap *s, const double (*rate)[3])
@@ -198,7 +199,7 @@ static void go_on(struct slow *w, const struct track_point *now, int iterations)
     struct snap *s = w->snap;
     double(*const before)[3] = s->rate;
     const double norm = rate_norm(s, (const double(*)[3])before);
-    w->drag = share_of_work(w, now->drag_Nmm - w->track->last.drag_Nmm);
+    w->drag = share_of_work(w, now->drag_Nmm - w->track->last.at.drag_Nmm);
     w->growth = w->has_rate ? rate_norm(s, (const double(*)[3])s->now) / norm : 0;
     track_book_slow(w->track, now);
     s->rate = s->now;
@@ -238,7 +239,7 @@ static enum ischia_code one_step(struct slow *w, newton_observe *observe, void *
     report->factorisations += newton.factorisations;
     if (newton.reason > 0) {
         TRY(weigh(w, free, &now, err));
-        stands = share_of_work(w, track_lost_Nmm(&w->track->last, &now)) <= lost_share_max;
+        stands = share_of_work(w, track_lost_Nmm(&w->track->last.at, &now)) <= lost_share_max;
     }
     if (!stands) {
         *ret_over = !go_back(w, free);

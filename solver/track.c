@@ -36,15 +36,47 @@ static void tangent_copy(struct newton_tangent *to, const struct newton_tangent 
 
 /* --- steps ------------------------------------------------------------------------------------ */
 
-static bool allocate(struct track *t)
+enum ischia_code track_step_init(struct track_step *ret, int node_count, struct ischia_error *err)
 {
-    const size_t nodes = (size_t)t->nodes;
-    t->u_mm = calloc(nodes, sizeof *t->u_mm);
-    t->normal_N = calloc(nodes, sizeof *t->normal_N);
-    t->anchor_mm = calloc(nodes, sizeof *t->anchor_mm);
-    const bool tangents =
-        tangent_allocate(&t->tangent, nodes) && tangent_allocate(&t->ahead, nodes);
-    return t->u_mm && t->normal_N && t->anchor_mm && tangents;
+    const size_t nodes = (size_t)node_count;
+    struct track_step s = {.u_mm = calloc(nodes, sizeof *s.u_mm),
+                           .normal_N = calloc(nodes, sizeof *s.normal_N),
+                           .anchor_mm = calloc(nodes, sizeof *s.anchor_mm)};
+    const bool tangents = tangent_allocate(&s.tangent, nodes) && tangent_allocate(&s.ahead, nodes);
+    if (!s.u_mm || !s.normal_N || !s.anchor_mm || !tangents) {
+        track_step_finish(&s);
+        return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for a load step");
+    }
+    *ret = s;
+    return ISCHIA_OK;
+}
+
+void track_step_finish(struct track_step *s)
+{
+    free(s->u_mm);
+    free(s->normal_N);
+    free(s->anchor_mm);
+    tangent_free(&s->tangent);
+    tangent_free(&s->ahead);
+    *s = (struct track_step){0};
+}
+
+static void step_copy(struct track_step *to, const struct track_step *from, size_t nodes)
+{
+    to->at = from->at;
+    memcpy(to->u_mm, from->u_mm, sizeof *to->u_mm * nodes);
+    memcpy(to->normal_N, from->normal_N, sizeof *to->normal_N * nodes);
+    memcpy(to->anchor_mm, from->anchor_mm, sizeof *to->anchor_mm * nodes);
+    tangent_copy(&to->tangent, &from->tangent, nodes);
+    tangent_copy(&to->ahead, &from->ahead, nodes);
+}
+
+/* --- tracks ----------------------------------------------------------------------------------- */
+
+static enum ischia_code init(struct track *t, struct ischia_error *err)
+{
+    TRY(track_step_init(&t->last, t->nodes, err));
+    return newton_create(&t->newton, t->body, t->assembly, t->seat, err);
 }
 
 enum ischia_code track_init(struct track *ret, struct body *body, struct assembly *assembly,
@@ -56,11 +88,7 @@ enum ischia_code track_init(struct track *ret, struct body *body, struct assembl
                       .state = state,
                       .height_mm = body->mesh->tip_z_mm,
                       .nodes = body->mesh->node_count};
-    enum ischia_code code;
-    if (allocate(&t))
-        code = newton_create(&t.newton, body, assembly, seat, err);
-    else
-        code = FAIL(err, ISCHIA_E_MEMORY, "not enough memory for the load path");
+    const enum ischia_code code = init(&t, err);
     if (code == ISCHIA_OK)
         *ret = t;
     else
@@ -71,21 +99,23 @@ enum ischia_code track_init(struct track *ret, struct body *body, struct assembl
 void track_finish(struct track *t)
 {
     newton_destroy(t->newton);
-    free(t->u_mm);
-    free(t->normal_N);
-    free(t->anchor_mm);
-    tangent_free(&t->tangent);
-    tangent_free(&t->ahead);
+    track_step_finish(&t->last);
     *t = (struct track){0};
+}
+
+static void keep_contact(struct track *t)
+{
+    const size_t nodes = (size_t)t->nodes;
+    memcpy(t->last.normal_N, t->seat->normal_N, sizeof *t->last.normal_N * nodes);
+    memcpy(t->last.anchor_mm, t->seat->anchor_mm, sizeof *t->last.anchor_mm * nodes);
 }
 
 enum ischia_code track_start(struct track *t, struct ischia_error *err)
 {
-    memcpy(t->normal_N, t->seat->normal_N, sizeof *t->normal_N * (size_t)t->nodes);
-    memcpy(t->anchor_mm, t->seat->anchor_mm, sizeof *t->anchor_mm * (size_t)t->nodes);
+    keep_contact(t);
     newton_linearise(t->newton, t->state);
-    TRY(newton_tangent(t->newton, t->state, &t->tangent, err));
-    t->last.stiffness_N_mm = t->tangent.stiffness_N_mm;
+    TRY(newton_tangent(t->newton, t->state, &t->last.tangent, err));
+    t->last.at.stiffness_N_mm = t->last.tangent.stiffness_N_mm;
     return ISCHIA_OK;
 }
 
@@ -96,82 +126,45 @@ bool track_is_uninverted(const struct track *t)
 
 void track_predict(struct track *t, double dd)
 {
+    const struct track_step *last = &t->last;
     for (double share = 1; share > 1e-3; share /= 2) {
         for (int n = 0; n < t->nodes; n++) {
             for (int c = 0; c < 3; c++)
-                t->state->u_mm[n][c] = t->u_mm[n][c] + share * dd * t->tangent.direction[n][c];
+                t->state->u_mm[n][c] =
+                    last->u_mm[n][c] + share * dd * last->tangent.direction[n][c];
             if (t->body->mesh->node_flags[n] & NODE_ON_SEAT)
                 seat_stop(t->body->mesh, n, t->state->u_mm[n]);
         }
-        t->state->d_mm = t->last.d_mm + share * dd;
+        t->state->d_mm = last->at.d_mm + share * dd;
         for (int n = 0; n < t->nodes; n++)
             t->seat->normal_N[n] =
-                fmax(0, t->normal_N[n] + share * dd * t->tangent.normal_rate_N_mm[n]);
+                fmax(0, last->normal_N[n] + share * dd * last->tangent.normal_rate_N_mm[n]);
         if (track_is_uninverted(t)) break;
     }
-    body_track_pressure(t->body, 1, (const double(*)[3])t->u_mm,
+    body_track_pressure(t->body, 1, (const double(*)[3])last->u_mm,
                         (const double(*)[3])t->state->u_mm);
 }
 
 void track_restore(struct track *t)
 {
+    const struct track_step *last = &t->last;
     const size_t nodes = (size_t)t->nodes;
-    memcpy(t->state->u_mm, t->u_mm, sizeof *t->u_mm * nodes);
-    memcpy(t->seat->normal_N, t->normal_N, sizeof *t->normal_N * nodes);
-    memcpy(t->seat->anchor_mm, t->anchor_mm, sizeof *t->anchor_mm * nodes);
-    t->state->d_mm = t->last.d_mm;
-    t->state->force_N = t->last.force_N;
+    memcpy(t->state->u_mm, last->u_mm, sizeof *last->u_mm * nodes);
+    memcpy(t->seat->normal_N, last->normal_N, sizeof *last->normal_N * nodes);
+    memcpy(t->seat->anchor_mm, last->anchor_mm, sizeof *last->anchor_mm * nodes);
+    t->state->d_mm = last->at.d_mm;
+    t->state->force_N = last->at.force_N;
     newton_linearise(t->newton, t->state);
 }
 
-/* --- memory ----------------------------------------------------------------------------------- */
-
-enum ischia_code track_memory_init(struct track_memory *ret, const struct track *t,
-                                   struct ischia_error *err)
+void track_remember(const struct track *t, struct track_step *ret)
 {
-    const size_t nodes = (size_t)t->nodes;
-    struct track_memory m = {.u_mm = calloc(nodes, sizeof *m.u_mm),
-                             .normal_N = calloc(nodes, sizeof *m.normal_N),
-                             .anchor_mm = calloc(nodes, sizeof *m.anchor_mm)};
-    const bool tangents = tangent_allocate(&m.tangent, nodes) && tangent_allocate(&m.ahead, nodes);
-    if (!m.u_mm || !m.normal_N || !m.anchor_mm || !tangents) {
-        track_memory_finish(&m);
-        return FAIL(err, ISCHIA_E_MEMORY, "not enough memory for a load step");
-    }
-    *ret = m;
-    return ISCHIA_OK;
+    step_copy(ret, &t->last, (size_t)t->nodes);
 }
 
-void track_memory_finish(struct track_memory *m)
+void track_recall(struct track *t, const struct track_step *step)
 {
-    free(m->u_mm);
-    free(m->normal_N);
-    free(m->anchor_mm);
-    tangent_free(&m->tangent);
-    tangent_free(&m->ahead);
-    *m = (struct track_memory){0};
-}
-
-void track_remember(const struct track *t, struct track_memory *m)
-{
-    const size_t nodes = (size_t)t->nodes;
-    m->last = t->last;
-    memcpy(m->u_mm, t->u_mm, sizeof *t->u_mm * nodes);
-    memcpy(m->normal_N, t->normal_N, sizeof *t->normal_N * nodes);
-    memcpy(m->anchor_mm, t->anchor_mm, sizeof *t->anchor_mm * nodes);
-    tangent_copy(&m->tangent, &t->tangent, nodes);
-    tangent_copy(&m->ahead, &t->ahead, nodes);
-}
-
-void track_recall(struct track *t, const struct track_memory *m)
-{
-    const size_t nodes = (size_t)t->nodes;
-    t->last = m->last;
-    memcpy(t->u_mm, m->u_mm, sizeof *t->u_mm * nodes);
-    memcpy(t->normal_N, m->normal_N, sizeof *t->normal_N * nodes);
-    memcpy(t->anchor_mm, m->anchor_mm, sizeof *t->anchor_mm * nodes);
-    tangent_copy(&t->tangent, &m->tangent, nodes);
-    tangent_copy(&t->ahead, &m->ahead, nodes);
+    step_copy(&t->last, step, (size_t)t->nodes);
     track_restore(t);
 }
 
@@ -206,9 +199,9 @@ void track_weigh_slow(struct track *t, double drag_Nmm, struct track_point *ret)
 {
     const double(*u)[3] = (const double(*)[3])t->state->u_mm;
     struct track_point now = {.d_mm = t->state->d_mm, .force_N = t->state->force_N};
-    now.work_Nmm = t->last.work_Nmm + trapezium_Nmm(&t->last, &now);
-    now.drag_Nmm = t->last.drag_Nmm + drag_Nmm;
-    now.friction_Nmm = t->last.friction_Nmm + seat_advance(t->seat, u, t->normal_N);
+    now.work_Nmm = t->last.at.work_Nmm + trapezium_Nmm(&t->last.at, &now);
+    now.drag_Nmm = t->last.at.drag_Nmm + drag_Nmm;
+    now.friction_Nmm = t->last.at.friction_Nmm + seat_advance(t->seat, u, t->last.normal_N);
     now.stored_Nmm = t->state->elastic_Nmm + seat_energy(t->seat, u);
     *ret = now;
 }
@@ -216,11 +209,11 @@ void track_weigh_slow(struct track *t, double drag_Nmm, struct track_point *ret)
 enum ischia_code track_weigh(struct track *t, double drag_Nmm, struct track_point *ret,
                              struct ischia_error *err)
 {
-    TRY(newton_tangent(t->newton, t->state, &t->ahead, err));
+    TRY(newton_tangent(t->newton, t->state, &t->last.ahead, err));
     track_weigh_slow(t, drag_Nmm, ret);
-    ret->stiffness_N_mm = t->ahead.stiffness_N_mm;
+    ret->stiffness_N_mm = t->last.ahead.stiffness_N_mm;
     ret->work_Nmm =
-        t->last.work_Nmm + (trapezium_Nmm(&t->last, ret) + correction_Nmm(&t->last, ret));
+        t->last.at.work_Nmm + (trapezium_Nmm(&t->last.at, ret) + correction_Nmm(&t->last.at, ret));
     return ISCHIA_OK;
 }
 
@@ -232,17 +225,15 @@ double track_lost_Nmm(const struct track_point *from, const struct track_point *
 
 void track_book_slow(struct track *t, const struct track_point *now)
 {
-    const size_t nodes = (size_t)t->nodes;
-    t->last = *now;
-    memcpy(t->u_mm, t->state->u_mm, sizeof *t->u_mm * nodes);
-    memcpy(t->normal_N, t->seat->normal_N, sizeof *t->normal_N * nodes);
-    memcpy(t->anchor_mm, t->seat->anchor_mm, sizeof *t->anchor_mm * nodes);
+    t->last.at = *now;
+    memcpy(t->last.u_mm, t->state->u_mm, sizeof *t->last.u_mm * (size_t)t->nodes);
+    keep_contact(t);
 }
 
 void track_book(struct track *t, const struct track_point *now)
 {
-    const struct newton_tangent before = t->tangent;
-    t->tangent = t->ahead;
-    t->ahead = before;
+    const struct newton_tangent before = t->last.tangent;
+    t->last.tangent = t->last.ahead;
+    t->last.ahead = before;
     track_book_slow(t, now);
 }

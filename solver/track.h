@@ -20,19 +20,31 @@ struct track_point {
     double drag_Nmm;       /* work against drag, in snaps */
 };
 
+/* All that a path needs to go on from there, or back to it. Arrays have an entry a node. */
+struct track_step {
+    struct track_point at;
+    double (*u_mm)[3];      /* displacements                   */
+    double *normal_N;       /* contact forces                  */
+    double (*anchor_mm)[2]; /* of the friction springs         */
+    struct newton_tangent tangent;
+    /* The tangent of a step that is being weighed. A step whose equilibrium is not stable has none
+     * (newton.h), and leaves here what it found. */
+    struct newton_tangent ahead;
+};
+
+/* Zeroed. ISCHIA_E_MEMORY. */
+ISCHIA_MUST_CHECK enum ischia_code track_step_init(struct track_step *ret, int node_count,
+                                                   struct ischia_error *err);
+void track_step_finish(struct track_step *step); /* a zeroed one is allowed */
+
 struct track {
     struct body *body;
     struct assembly *assembly;
     struct seat *seat;
     struct newton *newton;
-    struct equilibrium *state;     /* of the step that is under way               */
-    struct track_point last;       /* the last converged step                     */
-    double (*u_mm)[3];             /* [node] displacements there                  */
-    struct newton_tangent tangent; /* there                                       */
-    double *normal_N;              /* [node] contact forces there                 */
-    double (*anchor_mm)[2];        /* [node] of the friction springs there        */
-    struct newton_tangent ahead;   /* the tangent of a step that is being weighed */
-    double height_mm;              /* of the tissue, unloaded                     */
+    struct equilibrium *state; /* of the step that is under way */
+    struct track_step last;    /* the last converged step       */
+    double height_mm;          /* of the tissue, unloaded       */
     int nodes;
 };
 
@@ -65,23 +77,10 @@ ISCHIA_MUST_CHECK enum ischia_code track_weigh(struct track *track, double drag_
                                                struct track_point *ret, struct ischia_error *err);
 void track_weigh_slow(struct track *track, double drag_Nmm, struct track_point *ret);
 
-/* A copy of the last step, to go back to when the track has gone on. `ahead` is part of it: a step
- * whose equilibrium is not stable has no tangent (newton.h), and leaves there what it found. */
-struct track_memory {
-    struct track_point last;
-    double (*u_mm)[3];
-    struct newton_tangent tangent, ahead;
-    double *normal_N;
-    double (*anchor_mm)[2];
-};
-
-/* Room for a track's steps. ISCHIA_E_MEMORY. */
-ISCHIA_MUST_CHECK enum ischia_code
-track_memory_init(struct track_memory *ret, const struct track *track, struct ischia_error *err);
-void track_memory_finish(struct track_memory *memory); /* a zeroed one is allowed */
-void track_remember(const struct track *track, struct track_memory *memory);
+/* The last step, to go back to when the track has gone on: *ret is an initialised step. */
+void track_remember(const struct track *track, struct track_step *ret);
 /* The step is the last one again, and the state with it. */
-void track_recall(struct track *track, const struct track_memory *memory);
+void track_recall(struct track *track, const struct track_step *step);
 
 /* Goes on from a weighed step: it is the last one now; its tangent with it, or the old one kept. */
 void track_book(struct track *track, const struct track_point *now);

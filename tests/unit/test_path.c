@@ -165,17 +165,18 @@ static void a_path_goes_on_to_larger_forces(void **state)
 
 static void fill(struct track *t, double with)
 {
+    struct track_step *s = &t->last;
     for (int n = 0; n < t->nodes; n++) {
-        t->normal_N[n] = t->tangent.normal_rate_N_mm[n] = t->ahead.normal_rate_N_mm[n] = with + n;
+        s->normal_N[n] = s->tangent.normal_rate_N_mm[n] = s->ahead.normal_rate_N_mm[n] = with + n;
         for (int c = 0; c < 3; c++) {
-            t->u_mm[n][c] = 1e-3 * sin(with + n + c); /* a body that can be: it is linearised */
-            t->tangent.direction[n][c] = t->ahead.direction[n][c] = with * (c - 1) + n;
+            s->u_mm[n][c] = 1e-3 * sin(with + n + c); /* a body that can be: it is linearised */
+            s->tangent.direction[n][c] = s->ahead.direction[n][c] = with * (c - 1) + n;
         }
-        for (int c = 0; c < 2; c++) t->anchor_mm[n][c] = with - n - c;
+        for (int c = 0; c < 2; c++) s->anchor_mm[n][c] = with - n - c;
     }
-    t->last = (struct track_point){with, 2 * with, 3, 4, 5, 6, 7};
-    t->tangent.stiffness_N_mm = 8 * with;
-    t->ahead.stiffness_N_mm = 9 * with;
+    s->at = (struct track_point){with, 2 * with, 3, 4, 5, 6, 7};
+    s->tangent.stiffness_N_mm = 8 * with;
+    s->ahead.stiffness_N_mm = 9 * with;
 }
 
 static void assert_same_numbers(const void *a, const void *b, size_t per_node,
@@ -190,29 +191,31 @@ static void a_memory_holds_the_whole_step(void **state)
     (void)state;
     struct bench a, b;
     struct track one, other;
-    struct track_memory memory;
+    struct track_step memory;
+    const struct track_step *last = &one.last, *expected = &other.last;
     bench_make(&a);
     bench_make(&b);
     assert_int_equal(track_init(&one, &a.body, &a.assembly, &a.seat, &a.state, NULL), ISCHIA_OK);
     assert_int_equal(track_init(&other, &b.body, &b.assembly, &b.seat, &b.state, NULL), ISCHIA_OK);
-    assert_int_equal(track_memory_init(&memory, &one, NULL), ISCHIA_OK);
+    assert_int_equal(track_step_init(&memory, one.nodes, NULL), ISCHIA_OK);
     fill(&one, 0.25);
     fill(&other, 0.25);
     track_remember(&one, &memory);
     fill(&one, 0.5);
     track_recall(&one, &memory);
-    assert_memory_equal(&one.last, &other.last, sizeof one.last);
-    assert_same_numbers(one.u_mm, other.u_mm, 3, &one);
-    assert_same_numbers(one.state->u_mm, other.u_mm, 3, &one);
-    assert_same_numbers(one.normal_N, other.normal_N, 1, &one);
-    assert_same_numbers(one.anchor_mm, other.anchor_mm, 2, &one);
-    assert_same_numbers(one.tangent.direction, other.tangent.direction, 3, &one);
-    assert_same_numbers(one.tangent.normal_rate_N_mm, other.tangent.normal_rate_N_mm, 1, &one);
-    assert_same_numbers(one.ahead.direction, other.ahead.direction, 3, &one);
-    assert_same_numbers(one.ahead.normal_rate_N_mm, other.ahead.normal_rate_N_mm, 1, &one);
-    assert_true(one.tangent.stiffness_N_mm == other.tangent.stiffness_N_mm);
-    assert_true(one.ahead.stiffness_N_mm == other.ahead.stiffness_N_mm);
-    track_memory_finish(&memory);
+    assert_memory_equal(&last->at, &expected->at, sizeof last->at);
+    assert_same_numbers(last->u_mm, expected->u_mm, 3, &one);
+    assert_same_numbers(one.state->u_mm, expected->u_mm, 3, &one);
+    assert_same_numbers(last->normal_N, expected->normal_N, 1, &one);
+    assert_same_numbers(last->anchor_mm, expected->anchor_mm, 2, &one);
+    assert_same_numbers(last->tangent.direction, expected->tangent.direction, 3, &one);
+    assert_same_numbers(last->tangent.normal_rate_N_mm, expected->tangent.normal_rate_N_mm, 1,
+                        &one);
+    assert_same_numbers(last->ahead.direction, expected->ahead.direction, 3, &one);
+    assert_same_numbers(last->ahead.normal_rate_N_mm, expected->ahead.normal_rate_N_mm, 1, &one);
+    assert_true(last->tangent.stiffness_N_mm == expected->tangent.stiffness_N_mm);
+    assert_true(last->ahead.stiffness_N_mm == expected->ahead.stiffness_N_mm);
+    track_step_finish(&memory);
     track_finish(&one);
     track_finish(&other);
     bench_finish(&a);

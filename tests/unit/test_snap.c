@@ -92,22 +92,22 @@ static void slow_motion_ends_where_a_load_step_ends(void **state)
     struct ischia_error err;
     pressed_make(&slow);
     pressed_make(&fast);
-    const struct track_point from = slow.track.last;
+    const struct track_point from = slow.track.last.at;
     must(snap_follow(slow.snap, &slow.track, 0.05, 500, NULL, NULL, &report, &err), &err);
     press_on(&fast, 0.05);
     assert_true(report.arrived);
     assert_true(report.newton_iterations > 0 && report.factorisations > 0);
-    assert_near(slow.track.last.d_mm, 1.05, 1e-12);
+    assert_near(slow.track.last.at.d_mm, 1.05, 1e-12);
     /* Residuals on the way are a thousandth of a force that is up to 20 times the present one. */
-    assert_near(slow.track.last.force_N / fast.track.last.force_N, 1, 2e-2);
-    assert_true(slow.track.last.stiffness_N_mm > 0);
-    const double work = slow.track.last.work_Nmm - from.work_Nmm;
-    const double drag = slow.track.last.drag_Nmm - from.drag_Nmm;
+    assert_near(slow.track.last.at.force_N / fast.track.last.at.force_N, 1, 2e-2);
+    assert_true(slow.track.last.at.stiffness_N_mm > 0);
+    const double work = slow.track.last.at.work_Nmm - from.work_Nmm;
+    const double drag = slow.track.last.at.drag_Nmm - from.drag_Nmm;
     assert_true(drag > 0);
     /* The bone pushes against drag, so it does more work than without, and by as much. */
-    assert_near((work - drag) / (fast.track.last.work_Nmm - from.work_Nmm), 1, 2e-2);
-    assert_true(fabs(track_lost_Nmm(&from, &slow.track.last)) < 0.02 * work);
-    assert_true(fabs(track_lost_Nmm(&from, &slow.track.last)) < 0.1 * drag);
+    assert_near((work - drag) / (fast.track.last.at.work_Nmm - from.work_Nmm), 1, 2e-2);
+    assert_true(fabs(track_lost_Nmm(&from, &slow.track.last.at)) < 0.02 * work);
+    assert_true(fabs(track_lost_Nmm(&from, &slow.track.last.at)) < 0.1 * drag);
     pressed_finish(&slow);
     pressed_finish(&fast);
 }
@@ -121,8 +121,8 @@ static void a_move_that_is_too_long_is_shortened(void **state)
     struct ischia_error err;
     pressed_make(&p);
     must(snap_follow(p.snap, &p.track, 30, 2000, NULL, NULL, &report, &err), &err);
-    if (report.arrived) assert_true(p.track.last.d_mm > 1 && p.track.last.d_mm < 10);
-    assert_true(body_det_F_min(&p.b.body, (const double(*)[3])p.track.u_mm) > 0);
+    if (report.arrived) assert_true(p.track.last.at.d_mm > 1 && p.track.last.at.d_mm < 10);
+    assert_true(body_det_F_min(&p.b.body, (const double(*)[3])p.track.last.u_mm) > 0);
     pressed_finish(&p);
 }
 
@@ -174,14 +174,14 @@ static void the_end_is_an_equilibrium_of_the_model(void **state)
     struct body_derivatives d = {.force = calloc(nodes, sizeof *d.force),
                                  .border = calloc((size_t)p.b.assembly.n, sizeof *d.border)};
     assert_true(d.force != NULL && d.border != NULL);
-    const double(*u)[3] = (const double(*)[3])p.track.u_mm;
+    const double(*u)[3] = (const double(*)[3])p.track.last.u_mm;
     double sum = 0;
     (void)body_linearise(&p.b.body, &p.b.assembly, u, 0, &d);
     for (size_t n = 0; n < nodes; n++) /* inside, where neither seat nor bone acts */
         for (int c = 0; c < 3; c++)
             if (p.b.assembly.equation[n][c] >= 0 && !(p.b.mesh.node_flags[n] & NODE_ON_SEAT))
                 sum += d.force[n][c] * d.force[n][c];
-    assert_true(sqrt(sum) <= 1e-3 * track_force_scale_N(p.track.last.force_N));
+    assert_true(sqrt(sum) <= 1e-3 * track_force_scale_N(p.track.last.at.force_N));
     free(d.force);
     free(d.border);
     pressed_finish(&p);
