@@ -12,38 +12,7 @@
 #include "solver/mesh.h"
 #include "solver/solver.h"
 #include "tests/unit/near.h"
-
-/* Row 1R of Table 2, coarse; `variant` makes others of it. */
-static struct ischia_case coarse_case(int variant)
-{
-    static const double param[ISCHIA_PARAM_COUNT] = {6.9, 19.7, 28, 10, 8, 5, 196};
-    struct ischia_case c = ischia_case_default();
-    memcpy(c.param, param, sizeof param);
-    c.param[ISCHIA_F] += 10 * variant;
-    c.param[ISCHIA_EM] -= 3 * variant;
-    c.resolution = ISCHIA_COARSE;
-    return c;
-}
-
-static struct ischia_solver *solver_make(void)
-{
-    struct ischia_solver *solver;
-    struct ischia_error err;
-    if (ischia_solver_create(&solver, &err) != ISCHIA_OK) fail_msg("%s", err.message);
-    return solver;
-}
-
-static struct ischia_result solve(struct ischia_solver *solver, const struct ischia_case *c,
-                                  struct ischia_field *ret_field)
-{
-    struct ischia_result result;
-    struct ischia_error err = {.message = "as it was"};
-    memset(&result, 0x5a, sizeof result);
-    if (ischia_solve(solver, c, NULL, &result, ret_field, &err) != ISCHIA_OK)
-        fail_msg("%s", err.message);
-    assert_string_equal(err.message, "as it was");
-    return result;
-}
+#include "tests/unit/solving.h"
 
 static void result_is_whole(void **state)
 {
@@ -133,21 +102,6 @@ static void same_case_same_bits(void **state)
 
 /* --- observers -------------------------------------------------------------------------------- */
 
-static void same_bits(const struct ischia_result *a, const struct ischia_result *b)
-{
-    assert_true(ischia_result_converged(a));
-    assert_memory_equal(&a->strain, &b->strain, sizeof a->strain);
-    assert_memory_equal(a->clusters, b->clusters, sizeof a->clusters);
-    assert_memory_equal(&a->seat, &b->seat, sizeof a->seat);
-    assert_int_equal(a->load_curve_count, b->load_curve_count);
-    assert_memory_equal(a->load_curve, b->load_curve,
-                        sizeof *a->load_curve * (size_t)a->load_curve_count);
-    assert_int_equal(a->numerics.newton_iterations, b->numerics.newton_iterations);
-    assert_int_equal(a->numerics.factorisations, b->numerics.factorisations);
-    assert_true(a->numerics.energy_residual == b->numerics.energy_residual);
-    assert_string_equal(a->numerics.detail, b->numerics.detail);
-}
-
 /* Whatever was solved before: from rest, or on from a smaller force of the same side. */
 static void a_larger_force_goes_on_with_the_same_bits(void **state)
 {
@@ -194,60 +148,6 @@ static int calls_for(struct ischia_solver *solver, const struct ischia_case *c)
     struct ischia_result r;
     assert_int_equal(ischia_solve(solver, c, &observer, &r, NULL, NULL), ISCHIA_OK);
     return w.calls;
-}
-
-static bool count(void *context, const struct ischia_progress *p)
-{
-    assert_true(p->load_step >= 1); /* another attempt counts anew */
-    ++*(int *)context;
-    return true;
-}
-
-static int iterations_for(struct ischia_solver *solver, const struct ischia_case *c,
-                          struct ischia_result *ret)
-{
-    int calls = 0;
-    const struct ischia_observer observer = {count, &calls};
-    assert_int_equal(ischia_solve(solver, c, &observer, ret, NULL, NULL), ISCHIA_OK);
-    return calls;
-}
-
-/* A soft side whose first attempt ends below the smaller force; then the larger one. Iterations
- * made, of how many the result counts. */
-static int iterations_after(const double param[ISCHIA_PARAM_COUNT], double larger_N, int *ret_of)
-{
-    struct ischia_solver *solver = solver_make(), *fresh = solver_make();
-    struct ischia_case c = coarse_case(0);
-    memcpy(c.param, param, sizeof c.param);
-    const struct ischia_result r = solve(solver, &c, NULL);
-    assert_non_null(strstr(r.numerics.detail, "corners"));
-    c.param[ISCHIA_F] = larger_N;
-    struct ischia_result cold, warm;
-    *ret_of = iterations_for(fresh, &c, &cold);
-    const int on = iterations_for(solver, &c, &warm);
-    same_bits(&warm, &cold);
-    ischia_solver_destroy(solver);
-    ischia_solver_destroy(fresh);
-    return on;
-}
-
-static void a_later_attempt_goes_on_too(void **state)
-{
-    (void)state;
-    static const double param[ISCHIA_PARAM_COUNT] = {3, 39, 19, 35, 1, 8, 192};
-    int from_rest;
-    const int on = iterations_after(param, 310, &from_rest);
-    assert_in_range(on, 1, from_rest / 3);
-}
-
-/* A path whose last step was taken in parts goes on from before that step. */
-static void a_path_goes_on_from_where_it_left(void **state)
-{
-    (void)state;
-    static const double param[ISCHIA_PARAM_COUNT] = {3, 15, 19, 22, 1, 2.8, 270};
-    int from_rest;
-    const int on = iterations_after(param, 310, &from_rest);
-    assert_in_range(on, 1, from_rest / 3);
 }
 
 static void going_on_is_less_work_until_forgotten(void **state)
@@ -343,8 +243,6 @@ int main(void)
         cmocka_unit_test(field_fits_the_mesh),
         cmocka_unit_test(same_case_same_bits),
         cmocka_unit_test(a_larger_force_goes_on_with_the_same_bits),
-        cmocka_unit_test(a_later_attempt_goes_on_too),
-        cmocka_unit_test(a_path_goes_on_from_where_it_left),
         cmocka_unit_test(going_on_is_less_work_until_forgotten),
         cmocka_unit_test(progress_never_goes_back),
         cmocka_unit_test(cancelling_leaves_no_trace),
