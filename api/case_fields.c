@@ -261,8 +261,7 @@ static void set_sd(struct case_doc_fields *fields, int key, double value)
         fields->sd[input] = value;
         return;
     }
-    (void)snprintf(given, sizeof given, "%g", value);
-    case_key_refuse(fields, key, "out_of_range", given);
+    case_key_refuse(fields, key, "out_of_range", text_from_number(value, given));
 }
 
 void case_key_set_number(struct case_doc_fields *fields, int key, double value)

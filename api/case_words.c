@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/text.h"
+
 const struct param_words param_words[ISCHIA_PARAM_COUNT] = {
     [ISCHIA_R1] = {WORD_DAEMON_PARAM_R1_NAME, WORD_DAEMON_PARAM_R1_HELP},
     [ISCHIA_R2] = {WORD_DAEMON_PARAM_R2_NAME, WORD_DAEMON_PARAM_R2_HELP},
@@ -83,22 +85,24 @@ void case_fault_words(struct ischia_fault *ret, enum language language, const st
                                word_number("max", s.accepted_max, 6), word_text("unit", s.unit)));
         break;
     case ISCHIA_CASE_ORDER:
-        (void)words_fill(ret->detail, sizeof ret->detail, language, WORD_DAEMON_FAULT_ORDER,
-                         WORDS(word_number("R2", c->param[ISCHIA_R2], 6),
-                               word_number("R1", c->param[ISCHIA_R1], 6)));
+        (void)words_fill(
+            ret->detail, sizeof ret->detail, language, WORD_DAEMON_FAULT_ORDER,
+            WORDS(word_number("R2", c->param[ISCHIA_R2], text_digits(c->param[ISCHIA_R2])),
+                  word_number("R1", c->param[ISCHIA_R1], text_digits(c->param[ISCHIA_R1]))));
         break;
     case ISCHIA_CASE_UNSTUDIED:
         (void)words_fill(ret->detail, sizeof ret->detail, language, WORD_DAEMON_FAULT_UNSTUDIED,
-                         WORDS(word_text("key", s.key), word_number("value", s.value, 6),
+                         WORDS(word_text("key", s.key),
+                               word_number("value", s.value, text_digits(s.value)),
                                word_number("min", s.studied_min, 6),
                                word_number("max", s.studied_max, 6), word_text("unit", s.unit)));
         break;
     default:
-        (void)words_fill(ret->detail, sizeof ret->detail, language, WORD_DAEMON_FAULT_RANGE,
-                         WORDS(word_text("key", s.key), word_number("value", s.value, 6),
-                               word_number("min", s.accepted_min, 6),
-                               word_number("max", s.accepted_max, 6),
-                               word_text("unit", case_spaced_unit(s.unit, unit))));
+        (void)words_fill(
+            ret->detail, sizeof ret->detail, language, WORD_DAEMON_FAULT_RANGE,
+            WORDS(word_text("key", s.key), word_number("value", s.value, text_digits(s.value)),
+                  word_number("min", s.accepted_min, 6), word_number("max", s.accepted_max, 6),
+                  word_text("unit", case_spaced_unit(s.unit, unit))));
     }
 }
 

@@ -44,8 +44,8 @@ static void read_number(const struct reader *in, const char *key, double min, do
         return;
     }
     doc_faults_add(in->faults, doc_pointer(pointer, sizeof pointer, in->pointer, key),
-                   "out_of_range", "%s is %.6g; accepted %s%g to %g", key, number,
-                   whole ? "whole numbers " : "", min, max);
+                   "out_of_range", "%s is %.*g; accepted %s%g to %g", key, text_digits(number),
+                   number, whole ? "whole numbers " : "", min, max);
 }
 
 static void refuse_unknown(const struct reader *in, const char *const *known)
@@ -114,6 +114,11 @@ static void read_factor(const struct reader *in, struct design *d)
 {
     static const char *const known[] = {"key", "levels", "min", "max", "scale", NULL};
     struct design_factor factor = {0};
+    if (json_type_of(in->object) != JSON_OBJECT) { /* its members would have no keys */
+        doc_faults_add(in->faults, in->pointer, "wrong_type",
+                       "a factor is an object with \"key\" and \"levels\"");
+        return;
+    }
     const struct json *key = member_of_type(in, "key", JSON_STRING);
     const char *name = key != NULL ? json_string(key) : "";
     refuse_unknown(in, known);

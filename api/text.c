@@ -77,14 +77,26 @@ enum ischia_code text_out_take(struct text_out *out, char **ret_text, size_t *re
 
 /* ---- numbers ---- */
 
+/* Into buffer, with as few digits as read back as the same; returns how many. */
+static int print_shortest(double value, int digits, char buffer[TEXT_NUMBER_BYTES])
+{
+    for (;; digits++) {
+        (void)snprintf(buffer, TEXT_NUMBER_BYTES, "%.*g", digits, value);
+        if (digits == 17 || strtod(buffer, NULL) == value) return digits;
+    }
+}
+
 const char *text_from_number(double value, char buffer[TEXT_NUMBER_BYTES])
 {
     assert(buffer != NULL && isfinite(value));
-    for (int digits = 15; digits <= 17; digits++) {
-        (void)snprintf(buffer, TEXT_NUMBER_BYTES, "%.*g", digits, value);
-        if (strtod(buffer, NULL) == value) break;
-    }
+    (void)print_shortest(value, 15, buffer);
     return buffer;
+}
+
+int text_digits(double value)
+{
+    char buffer[TEXT_NUMBER_BYTES];
+    return print_shortest(value, 6, buffer);
 }
 
 static size_t skip_digits(const char *bytes, size_t length, size_t at)

@@ -39,6 +39,9 @@ ISCHIA_MUST_CHECK enum ischia_code text_out_take(struct text_out *out, char **re
  * never a comma. value is finite (asserted). Returns buffer. */
 enum { TEXT_NUMBER_BYTES = 32 };
 const char *text_from_number(double value, char buffer[TEXT_NUMBER_BYTES]);
+/* Significant digits, 6 to 17, with which value (finite) reads back as itself: 600.0001 is not to
+ * be called 600 by who refuses it for being more. */
+int text_digits(double value);
 
 /* True, and *ret_value set, when the whole of [bytes, bytes + length) is one number as RFC 8259
  * writes it ("-1.5e3", never "+1", "1.", ".5", "0x1", "1,5", "nan") of at most

@@ -134,10 +134,10 @@ class Life(Case):
         self.assertEqual(self.service.ask('POST', study + '/cancel').status, 409)
 
     def test_assessments_and_changes_do_not_know_of_it(self):
-        before = self.service.get('/v1/changes?limit=500').json()['last_seq']
+        before = self.service.get('/v1/changes?limit=500').json()['newest_seq']
         listed = [item['id'] for item in self.service.get('/v1/assessments').json()['items']]
         self.finish(self.start(design(5, F=214)))
-        self.assertEqual(self.service.get('/v1/changes').json()['last_seq'], before)
+        self.assertEqual(self.service.get('/v1/changes').json()['newest_seq'], before)
         after = [item['id'] for item in self.service.get('/v1/assessments').json()['items']]
         self.assertEqual(after, listed)
 
@@ -176,6 +176,11 @@ class Refusals(Case):
             {('/seed', 'unknown'), ('/factors/0', 'unknown'), ('/responses', 'unknown'),
              ('/case/F', 'missing'), ('/case/R1', 'missing')},
         )
+
+    def test_a_factor_that_is_no_object(self):
+        for factor in ([1], ['R1'], [[]], 1, 'R1', None, True):
+            answer = self.submit({**design(), 'factors': [factor]}, status=422)
+            self.assertIn(('/factors/0', 'wrong_type'), self.errors(answer), factor)
 
     def test_what_cannot_be_read(self):
         for body, headers, status in (
