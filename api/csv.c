@@ -149,8 +149,8 @@ static enum ischia_code check_shape(const struct csv_reader *r, const struct row
 static enum ischia_code check_bytes(const struct csv_reader *r, const char *bytes, size_t length,
                                     struct ischia_error *err)
 {
-    CHECK(memchr(bytes, '\0', length) == NULL, err, ISCHIA_E_INPUT, "line %ld: a NUL byte",
-          r->line);
+    CHECK(memchr(bytes, '\0', length) == NULL, err, ISCHIA_E_INPUT,
+          "line %ld: a NUL byte, as in UTF-16; save the file as UTF-8", r->line);
     CHECK(text_is_utf8(bytes, length), err, ISCHIA_E_INPUT,
           "line %ld: not valid UTF-8; save the file as UTF-8", r->line);
     return ISCHIA_OK;
@@ -213,20 +213,34 @@ static void put_separator(struct text_out *out, bool first)
     if (!first) text_put(out, ",", 1);
 }
 
-void csv_put_text(struct text_out *out, const char *utf8, bool first)
+static void put_field(struct text_out *out, const char *before, const char *utf8)
 {
-    put_separator(out, first);
-    if (strpbrk(utf8, ",\"\r\n") == NULL) {
+    const bool plain = strpbrk(utf8, ",\"\r\n") == NULL;
+    if (!plain) text_put(out, "\"", 1);
+    text_put_string(out, before);
+    if (plain) {
         text_put_string(out, utf8);
         return;
     }
-    text_put(out, "\"", 1);
     for (const char *quote; (quote = strchr(utf8, '"')) != NULL; utf8 = quote + 1) {
         text_put(out, utf8, (size_t)(quote - utf8) + 1);
         text_put(out, "\"", 1);
     }
     text_put_string(out, utf8);
     text_put(out, "\"", 1);
+}
+
+void csv_put_text(struct text_out *out, const char *utf8, bool first)
+{
+    put_separator(out, first);
+    put_field(out, "", utf8);
+}
+
+void csv_put_typed(struct text_out *out, const char *utf8, bool first)
+{
+    const bool is_formula = utf8[0] != '\0' && strchr("=+-@\t\r", utf8[0]) != NULL;
+    put_separator(out, first);
+    put_field(out, is_formula ? "'" : "", utf8);
 }
 
 void csv_put_number(struct text_out *out, double value, bool first)

@@ -47,6 +47,9 @@ ISCHIA_MUST_CHECK enum ischia_code csv_read(struct csv_reader *reader, struct cs
 /* Writing: the fields of a row one after the other, then the end of the line (LF). A field is
  * quoted when it must be. `first` leaves out the comma before it. */
 void csv_put_text(struct text_out *out, const char *utf8, bool first);
+/* A text that somebody typed: one that a spreadsheet would run as a formula has an apostrophe
+ * before it (OWASP, CSV injection). */
+void csv_put_typed(struct text_out *out, const char *utf8, bool first);
 void csv_put_number(struct text_out *out, double value,
                     bool first); /* not finite: an empty field */
 void csv_put_integer(struct text_out *out, long long value, bool first);

@@ -229,7 +229,8 @@ static bool write_csv_row(void *context, const struct store_assessment *row)
                                               request.label,
                                               request.measured_at,
                                               ischia_resolution_names[request.values.resolution]};
-    for (int i = 0; i < CSV_HEAD_COUNT; i++) csv_put_text(&page->out, head[i], i == 0);
+    for (int i = 0; i < CSV_HEAD_COUNT; i++)
+        (head[i] == request.label ? csv_put_typed : csv_put_text)(&page->out, head[i], i == 0);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
         csv_put_number(&page->out, request.values.param[i], false);
     put_csv_result(page, row);
@@ -277,9 +278,16 @@ void handle_list(struct call *call, struct http_response *ret)
 
 /* --------------------------------------------------------------------------- changes */
 
+struct changes_page {
+    struct json_out out;
+    int64_t last_seq; /* of the items; 0: none yet */
+};
+
 static bool write_change(void *context, const struct store_change *change)
 {
-    struct json_out *out = context;
+    struct changes_page *page = context;
+    struct json_out *out = &page->out;
+    page->last_seq = change->seq;
     char id[UUID_TEXT_BYTES], at[DOCUMENTS_TIME_BYTES];
     uuid_format(&change->id, id);
     documents_time(change->at_ms, at);
@@ -310,25 +318,28 @@ static bool read_changes_query(struct call *call, long long *ret_since, long lon
 
 void handle_changes(struct call *call, struct http_response *ret)
 {
-    struct json_out out;
+    struct changes_page page = {.last_seq = 0};
     struct ischia_error err;
     char *text = NULL;
     size_t size = 0;
-    int64_t last = 0;
+    int64_t newest = 0;
     long long since = 0, limit = CHANGES_USUAL;
     if (!read_changes_query(call, &since, &limit, ret)) return;
-    json_out_init(&out, 0);
-    json_open_object(&out, NULL);
-    json_open_array(&out, "items");
+    struct json_out *out = &page.out;
+    json_out_init(out, 0);
+    json_open_object(out, NULL);
+    json_open_array(out, "items");
     enum ischia_code code =
-        store_changes(call->service->store, since, (int)limit, write_change, &out, &last, &err);
-    json_close_array(&out);
-    json_put_integer(&out, "last_seq", last);
-    json_close_object(&out);
+        store_changes(call->service->store, since, (int)limit, write_change, &page, &newest, &err);
+    json_close_array(out);
+    /* Where to go on from: there may be more than the page has room for. */
+    json_put_integer(out, "last_seq", page.last_seq > 0 ? page.last_seq : newest);
+    json_put_integer(out, "newest_seq", newest);
+    json_close_object(out);
     if (code == ISCHIA_OK)
-        code = json_out_take(&out, &text, &size, &err);
+        code = json_out_take(out, &text, &size, &err);
     else
-        json_out_finish(&out);
+        json_out_finish(out);
     http_header_static(ret, "Cache-Control", "no-store");
     if (code == ISCHIA_OK)
         http_body(ret, "application/json", text, size);

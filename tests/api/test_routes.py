@@ -442,7 +442,7 @@ class Routes(unittest.TestCase):
             self.problem(self.service.get('/v1/changes?' + query), 400)
 
     def test_changes_come_in_order(self):
-        before = self.service.get('/v1/changes?since=0&limit=1').json()['last_seq']
+        before = self.service.get('/v1/changes?since=0&limit=1').json()['newest_seq']
         path = self.service.submit(F=320.5)['links']['self']
         self.service.ask('DELETE', path)
         page = self.service.get(f'/v1/changes?since={before}&limit=500').json()
@@ -453,6 +453,26 @@ class Routes(unittest.TestCase):
         numbers = [item['seq'] for item in page['items']]
         self.assertEqual(numbers, sorted(set(numbers)))
         self.assertEqual(page['last_seq'], numbers[-1])
+
+    def test_following_the_changes_loses_none(self):
+        for F in (321.5, 322.5):
+            self.service.submit(F=F)
+        whole = self.service.get('/v1/changes?since=0&limit=500').json()
+        self.assertEqual(whole['last_seq'], whole['newest_seq'])
+        seen, last = [], 0
+        while items := (page := self.service.get(f'/v1/changes?since={last}&limit=2').json())['items']:
+            last = page['last_seq']
+            self.assertEqual(last, items[-1]['seq'])
+            self.assertGreaterEqual(page['newest_seq'], last)
+            seen += items
+        self.assertEqual(seen[: len(whole['items'])], whole['items'])
+        self.assertEqual(page['last_seq'], page['newest_seq'])
+
+    def test_what_was_typed_is_no_formula_in_a_spreadsheet(self):
+        for label, cell in (('=1+1', "'=1+1"), ('@a,"b"', '\'@a,"b"'), ('-', "'-"), ('a=1', 'a=1')):
+            self.service.submit(label=label, subject='F-1')
+            text = self.service.get('/v1/assessments?subject=F-1&limit=1', Accept='text/csv').body.decode()
+            self.assertEqual(next(csv.DictReader(io.StringIO(text)))['label'], cell)
 
     # ----------------------------------------------------------- files and pages
 

@@ -73,11 +73,11 @@ class Cds(unittest.TestCase):
             self.assertTrue(card['source']['label'].startswith('Ischia'))
 
     def test_no_hook_starts_a_solve(self):
-        before = self.service.get('/v1/changes').json()['last_seq']
+        before = self.service.get('/v1/changes').json()['newest_seq']
         self.ask('ischia-patient-view', hook())
         self.assertEqual(self.ask('ischia-patient-view', hook(patient='nobody')).json(),
                          {'cards': []})
-        self.assertEqual(self.service.get('/v1/changes').json()['last_seq'], before)
+        self.assertEqual(self.service.get('/v1/changes').json()['newest_seq'], before)
 
     def test_newer_measurements_are_said_to_be_newer(self):
         (card,) = self.ask('ischia-patient-view', hook()).json()['cards']
