@@ -9,6 +9,7 @@
 
 #include "server/audit.h"
 #include "server/auth.h"
+#include "server/standard_streams.h"
 #include "server/store/store.h"
 
 const char admin_help[] =
@@ -90,6 +91,19 @@ static enum ischia_code parse_wish(struct token_wish *wish, const char *word,
     return ISCHIA_OK;
 }
 
+/* A secret that nobody got to see is of no use to its owner, only to others. */
+static enum ischia_code show_token(struct store *store, const char *token, struct ischia_error *err)
+{
+    char id[AUTH_ID_BYTES];
+    struct ischia_error unseen, second;
+    (void)printf("%s\n", token);
+    if (standard_output_flush(&unseen) == ISCHIA_OK) return ISCHIA_OK;
+    (void)snprintf(id, sizeof id, "%s", token + strlen(AUTH_TOKEN_PREFIX));
+    const bool revoked = auth_token_revoke(store, id, &second) == ISCHIA_OK;
+    return FAIL(err, unseen.code, "%.200s; the token %s %s", unseen.message, id,
+                revoked ? "has been revoked" : "could not be revoked: do it yourself");
+}
+
 static enum ischia_code token_create(struct store *store, char *const *words, int count,
                                      struct ischia_error *err)
 {
@@ -97,7 +111,7 @@ static enum ischia_code token_create(struct store *store, char *const *words, in
     char token[AUTH_TOKEN_BYTES];
     for (int i = 0; i < count; i++) TRY(parse_wish(&wish, words[i], err));
     TRY(auth_token_create(store, wish.scopes, wish.expires_ms, wish.name, token, err));
-    (void)printf("%s\n", token);
+    TRY(show_token(store, token, err));
     (void)fprintf(stderr,
                   "This is shown once: keep it now. Send it as `Authorization: Bearer …`.\n");
     return ISCHIA_OK;

@@ -15,7 +15,7 @@ enum {
     SECRET_TEXT_BYTES = 44, /* base64url without padding, and its NUL */
     HASH_BYTES = STORE_DIGEST_BYTES
 };
-static const char token_prefix[] = "ischia_";
+static const char token_prefix[] = AUTH_TOKEN_PREFIX;
 static const char hash_key[] = "ischia access token v1"; /* separates this use of BLAKE2b */
 
 struct token_list {

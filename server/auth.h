@@ -19,6 +19,8 @@
  * revoked, also by another process.
  */
 
+#define AUTH_TOKEN_PREFIX "ischia_"
+
 enum auth_scope {
     AUTH_READ = 1,   /* read assessments, changes, metrics   */
     AUTH_ASSESS = 2, /* submit and cancel                    */

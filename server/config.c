@@ -299,15 +299,23 @@ static const char *nearest_name(const char *name)
     return best <= 4 ? nearest : "";
 }
 
-enum ischia_code config_set(struct config *config, const char *name, const char *value,
-                            struct ischia_error *err)
+enum ischia_code config_find(const char *name, const struct config_option **ret,
+                             struct ischia_error *err)
 {
-    const struct config_option *option = find_option(name);
-    if (option != NULL) return set_option(config, option, value, err);
+    *ret = find_option(name);
+    if (*ret != NULL) return ISCHIA_OK;
     const char *nearest = nearest_name(name);
     if (nearest[0] == '\0') return FAIL(err, ISCHIA_E_INPUT, "no option is called '%.48s'", name);
     return FAIL(err, ISCHIA_E_INPUT, "no option is called '%.48s'; did you mean '%s'?", name,
                 nearest);
+}
+
+enum ischia_code config_set(struct config *config, const char *name, const char *value,
+                            struct ischia_error *err)
+{
+    const struct config_option *option = NULL;
+    TRY(config_find(name, &option, err));
+    return set_option(config, option, value, err);
 }
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
@@ -374,7 +382,7 @@ enum ischia_code config_read_file(struct config *config, const char *path, struc
 {
     enum { LARGEST_BYTES = 65536 };
     FILE *file = fopen(path, "re");
-    CHECK(file != NULL, err, ISCHIA_E_IO, "cannot open %s: %s", path, strerror(errno));
+    CHECK(file != NULL, err, ISCHIA_E_INPUT, "cannot open %s: %s", path, strerror(errno));
     char *text = malloc(LARGEST_BYTES);
     enum ischia_code code = ISCHIA_OK;
     if (text == NULL) {

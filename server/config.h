@@ -96,8 +96,11 @@ extern const size_t config_option_count;
 /* Every option at its default. */
 struct config config_default(void);
 
-/* Sets one option from its text. ISCHIA_E_INPUT names the option and what it accepts; a name that
- * does not exist is answered with the nearest one that does. */
+/* ISCHIA_E_INPUT: a name that does not exist is answered with the nearest one that does. */
+ISCHIA_MUST_CHECK enum ischia_code config_find(const char *name, const struct config_option **ret,
+                                               struct ischia_error *err);
+
+/* Sets one option from its text. ISCHIA_E_INPUT as config_find, or names what is accepted. */
 ISCHIA_MUST_CHECK enum ischia_code config_set(struct config *config, const char *name,
                                               const char *value, struct ischia_error *err);
 

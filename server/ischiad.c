@@ -23,6 +23,7 @@
 #include "server/notify.h"
 #include "server/outbound/outbound.h"
 #include "server/sandbox.h"
+#include "server/standard_streams.h"
 #include "server/textfile.h"
 
 /*
@@ -50,8 +51,8 @@ struct daemon {
 enum action { ACT_SERVE, ACT_CHECK, ACT_PRINT, ACT_MAN, ACT_ROUTES, ACT_HELP, ACT_VERSION };
 
 struct arguments {
-    const char *config_path; /* NULL: none */
-    char **flags;            /* pairs: option name, value */
+    char *config_path; /* NULL: none */
+    char **flags;      /* pairs: option name, value */
     int flag_count;
     char **words;
     int word_count;
@@ -77,26 +78,32 @@ static bool find_action(const char *flag, struct arguments *ret)
     return false;
 }
 
-static bool is_boolean_option(const char *name)
+/* Where the value of a flag goes that is no option of the daemon; NULL: it is one, or nothing. */
+static char **own_flag(struct arguments *a, const char *name)
 {
-    for (size_t i = 0; i < config_option_count; i++)
-        if (strcmp(config_options[i].name, name) == 0)
-            return config_options[i].kind == CONFIG_BOOLEAN;
-    return false;
+    const struct {
+        const char *name;
+        char **value;
+    } own[] = {{"config", &a->config_path}, {"from", &a->from}, {"to", &a->to}};
+    for (size_t i = 0; i < sizeof own / sizeof own[0]; i++)
+        if (strcmp(name, own[i].name) == 0) return own[i].value;
+    return NULL;
 }
 
-/* One "--name=value", "--name value" or "--switch"; returns how many words it took. */
+/* One "--name=value", "--name value" or "--switch"; returns how many words it took, 0: an error. */
 static int parse_flag(struct arguments *ret, char **argv, int left, struct ischia_error *err)
 {
+    static char yes[] = "true";
+    const struct config_option *option = NULL;
     char *name = argv[0] + 2, *equals = strchr(name, '=');
     if (find_action(name, ret)) return 1;
     if (equals != NULL) *equals = '\0';
     for (char *c = name; *c != '\0'; c++)
         if (*c == '-') *c = '_';
-    char *value = equals == NULL ? NULL : equals + 1;
-    static char yes[] = "true";
+    char **own = own_flag(ret, name), *value = equals == NULL ? NULL : equals + 1;
     int used = 1;
-    if (value == NULL && is_boolean_option(name)) value = yes;
+    if (own == NULL && config_find(name, &option, err) != ISCHIA_OK) return 0;
+    if (value == NULL && option != NULL && option->kind == CONFIG_BOOLEAN) value = yes;
     if (value == NULL && left > 1) {
         value = argv[1];
         used = 2;
@@ -105,12 +112,8 @@ static int parse_flag(struct arguments *ret, char **argv, int left, struct ischi
         (void)FAIL(err, ISCHIA_E_INPUT, "--%s needs a value", name);
         return 0;
     }
-    if (strcmp(name, "config") == 0) {
-        ret->config_path = value;
-        return used;
-    }
-    if (strcmp(name, "from") == 0 || strcmp(name, "to") == 0) {
-        *(name[0] == 'f' ? &ret->from : &ret->to) = value;
+    if (own != NULL) {
+        *own = value;
         return used;
     }
     ret->flags[2 * ret->flag_count] = name;
@@ -682,6 +685,22 @@ static int print_help(void)
     return EXIT_SUCCESS;
 }
 
+/* What options name has to be there. A worker program without a slash is looked for on the path. */
+static enum ischia_code check_files(const struct config *config, struct ischia_error *err)
+{
+    struct stat status;
+    struct estimator *estimator = NULL;
+    const char *worker = config->worker_program, *emulator = config->emulator;
+    CHECK(stat(config->state_dir, &status) != 0 || S_ISDIR(status.st_mode), err, ISCHIA_E_INPUT,
+          "state_dir: %s is not a directory", config->state_dir);
+    CHECK(strchr(worker, '/') == NULL || access(worker, X_OK) == 0, err, ISCHIA_E_INPUT,
+          "worker_program: cannot run %s: %s", worker, strerror(errno));
+    if (emulator[0] == '\0' || strcmp(emulator, "none") == 0) return ISCHIA_OK;
+    TRY(estimator_create(&estimator, emulator, err));
+    estimator_destroy(estimator);
+    return ISCHIA_OK;
+}
+
 /* What can be said about the options without starting. */
 static int check(const struct config *config)
 {
@@ -696,6 +715,7 @@ static int check(const struct config *config)
                     "behind_proxy",
                     config->listen);
     if (code == ISCHIA_OK) code = check_hl7_access(config, &err);
+    if (code == ISCHIA_OK) code = check_files(config, &err);
     if (code != ISCHIA_OK) return complain(&err);
     (void)printf("The options are good.\n");
     return EXIT_SUCCESS;
@@ -703,7 +723,13 @@ static int check(const struct config *config)
 
 static int act(const struct config *config, struct arguments *arguments)
 {
-    switch (arguments->action) {
+    const enum action action = arguments->action;
+    if (action != ACT_SERVE && action != ACT_HELP && arguments->word_count > 0) {
+        (void)fprintf(stderr, "ischiad: '%.80s' does not belong there; see ischiad --help\n",
+                      arguments->words[0]);
+        return EXIT_USAGE;
+    }
+    switch (action) {
     case ACT_CHECK:
         return check(config);
     case ACT_PRINT:
@@ -733,10 +759,12 @@ int main(int argc, char **argv)
     struct arguments arguments = {.action = ACT_SERVE};
     struct config config;
     struct ischia_error err;
+    standard_streams_hold();
     log_init(LOG_LEVEL_INFO);
     enum ischia_code code = parse_arguments(&arguments, argc, argv, &err);
     if (code == ISCHIA_OK) code = load_config(&config, &arguments, &err);
-    const int status = code == ISCHIA_OK ? act(&config, &arguments) : complain(&err);
+    int status = code == ISCHIA_OK ? act(&config, &arguments) : complain(&err);
     free(arguments.flags);
+    if (status == EXIT_SUCCESS && standard_output_flush(&err) != ISCHIA_OK) status = complain(&err);
     return status;
 }

@@ -16,7 +16,7 @@ enum ischia_code textfile_read(const char *path, char **ret, struct ischia_error
     FILE *file = fopen(path, "re");
     if (file == NULL) {
         free(text);
-        return FAIL(err, ISCHIA_E_IO, "cannot open %s: %s", path, strerror(errno));
+        return FAIL(err, ISCHIA_E_INPUT, "cannot open %s: %s", path, strerror(errno));
     }
     const size_t size = fread(text, 1, FILE_BYTES_MAX, file);
     const bool good = ferror(file) == 0 && size > 0 && size < FILE_BYTES_MAX;

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The program `ischia`: a table of commands. */
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "api/json.h"
 #include "api/text.h"
 #include "server/blas_environment.h"
 #include "server/cli/command.h"
+#include "server/standard_streams.h"
 #include "solver/case.h"
 
 static int command_help(int argc, char **argv);
@@ -78,14 +77,14 @@ static int command_help(int argc, char **argv)
     const struct command *command = find_command(argv[1]);
     if (command == NULL) return unknown_command(argv[1]);
     if (command->run == command_help) return command_help(1, argv);
-    char *const words[] = {argv[1], help, NULL};
-    char *copy[3];
-    memcpy(copy, words, sizeof copy);
-    return command->run(2, copy);
+    /* `help study merge` is `study merge --help`. */
+    char *words[] = {argv[1], argc > 2 ? argv[2] : help, argc > 2 ? help : NULL, NULL};
+    return command->run(argc > 2 ? 3 : 2, words);
 }
 
 int main(int argc, char **argv)
 {
+    standard_streams_hold();
     if (argc < 2) {
         print_overview(stderr);
         return EXIT_BAD_INPUT;
@@ -97,9 +96,8 @@ int main(int argc, char **argv)
     const struct command *command = find_command(name);
     if (command == NULL) return unknown_command(name);
     const int status = command->run(argc - 1, argv + 1);
-    if (fflush(stdout) != 0 && status == EXIT_DONE) {
-        (void)fprintf(stderr, "ischia: cannot write standard output: %s\n", strerror(errno));
-        return EXIT_SOLVE_FAILED;
-    }
-    return status;
+    struct ischia_error err;
+    if (standard_output_flush(&err) == ISCHIA_OK || status != EXIT_DONE) return status;
+    (void)fprintf(stderr, "ischia: %s\n", err.message);
+    return EXIT_SOLVE_FAILED;
 }

@@ -14,7 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "server/hl7/address.h"
+#include "server/address.h"
 
 struct link_tls {
     gnutls_certificate_credentials_t credentials;
@@ -172,7 +172,7 @@ enum ischia_code link_connect(struct link **ret, const char *address, struct lin
         (void)connect_to(a, &fd, timeout_ms);
     address_finish(&peer);
     CHECK(fd >= 0, err, ISCHIA_E_IO, "cannot connect to %.80s", address);
-    return open_link(ret, fd, tls, peer.host, timeout_ms, err);
+    return open_link(ret, fd, tls, peer.text.host, timeout_ms, err);
 }
 
 void link_close(struct link *link)

@@ -10,37 +10,19 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#define MAPPED_PREFIX "::ffff:"
+#include "server/address.h"
 
-/* "host:port" -> both parts, brackets removed. */
-static bool split_address(const char *address, char host[256], char port[8])
-{
-    const char *colon = strrchr(address, ':');
-    if (colon == NULL || colon == address || strlen(colon + 1) >= 8 || colon[1] == '\0')
-        return false;
-    size_t length = (size_t)(colon - address);
-    if (address[0] == '[' && colon[-1] == ']') {
-        address++;
-        length -= 2;
-    }
-    if (length == 0 || length >= 256) return false;
-    memcpy(host, address, length);
-    host[length] = '\0';
-    (void)snprintf(port, 8, "%s", colon + 1);
-    return true;
-}
+#define MAPPED_PREFIX "::ffff:"
 
 static enum ischia_code resolve(const char *address, struct addrinfo **ret,
                                 struct ischia_error *err)
 {
-    char host[256], port[8];
+    struct address_text parts;
     const struct addrinfo hints = {.ai_family = AF_UNSPEC,
                                    .ai_socktype = SOCK_STREAM,
                                    .ai_flags = AI_PASSIVE | AI_NUMERICSERV};
-    CHECK(split_address(address, host, port), err, ISCHIA_E_INPUT,
-          "listen is '%.80s'; expected ADDRESS:PORT, such as 127.0.0.1:8080 or [::1]:8080",
-          address);
-    const int cause = getaddrinfo(host, port, &hints, ret);
+    TRY(address_split(address, &parts, err));
+    const int cause = getaddrinfo(parts.host, parts.port, &hints, ret);
     CHECK(cause == 0, err, ISCHIA_E_INPUT, "listen is '%.80s': %s", address, gai_strerror(cause));
     return ISCHIA_OK;
 }

@@ -336,9 +336,17 @@ class Doors(unittest.TestCase):
         for options, words in (
             (('--wrokers', '2'), "did you mean 'workers'?"),
             (('--workers', 'two'), 'accepted 0 to 1024 processes'),
-            (('--listen', 'nowhere'), 'expected ADDRESS:PORT'),
+            (('--wrokers',), "did you mean 'workers'?"),
+            (('--workers',), 'needs a value'),
+            (('--listen', 'nowhere'), 'is not HOST:PORT'),
+            (('--listen', '127.0.0.1:70000'), 'not one of 0 to 65535'),
+            (('--hl7-listen', '[::1]:'), 'not one of 0 to 65535'),
             (('--audit', 'some'), 'accepted off, changes, all'),
             (('--config', '/nonexistent'), 'cannot open'),
+            (('--emulator', '/nonexistent'), 'cannot open'),
+            (('--worker-program', '/nonexistent'), 'cannot run'),
+            (('--state-dir', '/etc/passwd'), 'is not a directory'),
+            (('start',), 'does not belong there'),
         ):
             with tempfile.TemporaryDirectory() as state:
                 done = subprocess.run(
@@ -347,7 +355,7 @@ class Doors(unittest.TestCase):
                     text=True,
                     timeout=PATIENCE_S,
                 )
-            self.assertNotEqual(done.returncode, 0)
+            self.assertEqual(done.returncode, 2, options)
             self.assertIn(words, done.stderr)
 
     def test_good_options_are_said_to_be_good(self):

@@ -247,6 +247,31 @@ class Certificates(unittest.TestCase):
             self.assertIn('belong together', done.stderr)
 
 
+class StandardOutput(unittest.TestCase):
+    """What could not be printed is not said to be done."""
+
+    def ends_on(self, redirection, *words):
+        return subprocess.run(['/bin/sh', '-c', f'exec "$0" "$@" {redirection}', PROGRAM, *words],
+                              capture_output=True, text=True, timeout=PATIENCE_S)  # fmt: skip
+
+    def test_a_full_disk_is_a_failure(self):
+        for words in (['--print-config'], ['--help'], ['--version'], ['--print-man']):
+            done = self.ends_on('>/dev/full', *words)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn('No space left', done.stderr)
+
+    @file_only('the state directory is the store')
+    def test_a_token_that_nobody_saw_is_revoked(self):
+        for redirection in ('>/dev/full', '>&-'):
+            with tempfile.TemporaryDirectory() as state:
+                done = self.ends_on(redirection, '--state-dir', state, 'token', 'create')
+                self.assertEqual(done.returncode, 1)
+                self.assertIn('has been revoked', done.stderr)
+                token = admin(state, 'token', 'list').splitlines()[1].split()
+                self.assertNotEqual(token[4], '-')
+                self.assertEqual(len(token), 5)
+
+
 class Retention(unittest.TestCase):
     def left(self, service):
         return [item['id'] for item in service.get('/v1/assessments').json()['items']]

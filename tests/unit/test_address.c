@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "server/hl7/address.h"
+#include "server/address.h"
 
 static void a_host_and_a_port_are_found(void **state)
 {
@@ -22,7 +22,7 @@ static void a_host_and_a_port_are_found(void **state)
         struct address address;
         struct ischia_error err = {0};
         if (address_find(known[i].text, &address, &err) != ISCHIA_OK) fail_msg("%s", err.message);
-        assert_string_equal(address.host, known[i].host);
+        assert_string_equal(address.text.host, known[i].host);
         assert_int_equal(address.where->ai_family, known[i].family);
         in_port_t port; /* second in both families */
         memcpy(&port, (const char *)address.where->ai_addr + offsetof(struct sockaddr_in, sin_port),
@@ -42,10 +42,17 @@ static void what_is_no_address_is_refused(void **state)
         const char *text;
         enum ischia_code code;
     } wrong[] = {
-        {"", ISCHIA_E_INPUT},          {"host", ISCHIA_E_INPUT},
-        {":2575", ISCHIA_E_INPUT},     {"[]:2575", ISCHIA_E_INPUT},
-        {long_host, ISCHIA_E_INPUT},   {"127.0.0.1:no-port", ISCHIA_E_IO},
-        {"127.0.0.1:-1", ISCHIA_E_IO},
+        {"", ISCHIA_E_INPUT},
+        {"host", ISCHIA_E_INPUT},
+        {":2575", ISCHIA_E_INPUT},
+        {"[]:2575", ISCHIA_E_INPUT},
+        {long_host, ISCHIA_E_INPUT},
+        {"127.0.0.1:no-port", ISCHIA_E_INPUT},
+        {"127.0.0.1:-1", ISCHIA_E_INPUT},
+        {"127.0.0.1:65536", ISCHIA_E_INPUT},
+        {"127.0.0.1: 80", ISCHIA_E_INPUT},
+        {"127.0.0.1:4294967376", ISCHIA_E_INPUT},
+        {"no.such.host.invalid:1", ISCHIA_E_IO},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct address address;
