@@ -2,14 +2,22 @@
 #include "server/cli/bar.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 enum { BAR_WIDTH = 30 };
 
+/* A terminal that can go back to the start of a line. */
+static bool can_redraw(void)
+{
+    const char *kind = getenv("TERM");
+    return isatty(STDERR_FILENO) == 1 && kind != NULL && strcmp(kind, "dumb") != 0;
+}
+
 void bar_init(struct bar *ret)
 {
-    ret->shown = isatty(STDERR_FILENO) == 1;
+    ret->shown = can_redraw();
     ret->drawn = false;
 }
 

@@ -168,6 +168,7 @@ static enum ischia_code write_row(struct cohort *k, struct row *row, struct isch
         uncertainty_csv_put(&line, row->has_uncertainty ? &row->uncertainty : NULL);
     csv_end_row(&line);
     TRY(text_out_take(&line, &text, &length, err));
+    bar_clear(&k->bar); /* both may be the same terminal */
     const enum ischia_code code = line_out_write(&k->out, text, length, err);
     free(text);
     return code;
@@ -236,8 +237,10 @@ static enum ischia_code read_header(struct cohort *k, struct ischia_error *err)
 {
     struct csv_row row;
     struct doc_faults faults;
+    struct ischia_error cause;
     bool end;
-    TRY(csv_read(&k->reader, &row, &end, err));
+    if (csv_read(&k->reader, &row, &end, &cause) != ISCHIA_OK)
+        return FAIL(err, cause.code, "%s: %.400s", k->path, cause.message);
     CHECK(!end, err, ISCHIA_E_INPUT, "%s is empty; the first row names the columns", k->path);
     doc_faults_init(&faults);
     const enum ischia_code code = cohort_columns_init(&k->columns, &row, k->sd, &faults, err);
@@ -308,7 +311,7 @@ static int run_file(const char *path, const struct cohort_options *options)
     struct cohort *k = calloc(1, sizeof *k);
     int status = EXIT_SOLVE_FAILED;
     if (k != NULL) {
-        k->path = strcmp(path, "-") == 0 ? "standard input" : path;
+        k->path = file_name(path);
         k->emulator = options->emulator;
         k->sd = options->sd;
         k->defaults = options->defaults;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* ischia export: the model of a case for other programs. */
+#include "server/cli/files.h"
 #include "server/cli/options.h"
 #include "server/cli/run.h"
 #include "server/cli/section_words.h"
@@ -21,11 +22,13 @@ static const struct {
     [FORMAT_SVG] = {section_write_english, true},
 };
 
-static int export_case(enum format format, const char *path, const struct ischia_case *c)
+static int export_case(enum format format, const char *input, const char *path,
+                       const struct ischia_case *c)
 {
     struct ischia_result result;
     struct ischia_field field = {0};
     struct ischia_error err;
+    if (file_out_check(path, &input, 1, &err) != ISCHIA_OK) return report_error("export", &err);
     if (formats[format].needs_solve) {
         if (solve_with_bar(c, &result, &field, &err) != ISCHIA_OK)
             return report_error("export", &err);
@@ -75,5 +78,5 @@ int command_export(int argc, char **argv)
         return EXIT_BAD_INPUT;
     }
     const int read = read_request("export", path, resolution, &request);
-    return read == EXIT_DONE ? export_case(format, output, &request.values) : read;
+    return read == EXIT_DONE ? export_case(format, path, output, &request.values) : read;
 }

@@ -5,10 +5,13 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 static bool is_dash(const char *path) { return strcmp(path, "-") == 0; }
+
+const char *file_name(const char *path) { return is_dash(path) ? "standard input" : path; }
 
 /* ---- reading ---- */
 
@@ -58,10 +61,48 @@ enum ischia_code file_read(const char *path, size_t bytes_max, char **ret_text, 
 {
     FILE *in = NULL;
     TRY(file_open(path, &in, err));
-    const char *name = in == stdin ? "standard input" : path;
-    const enum ischia_code code = read_stream(in, name, bytes_max, ret_text, ret_length, err);
+    const enum ischia_code code =
+        read_stream(in, file_name(path), bytes_max, ret_text, ret_length, err);
     file_close(in);
     return code;
+}
+
+/* ---- where an output can go ---- */
+
+static bool is_same_regular(const struct stat *a, const struct stat *b)
+{
+    return S_ISREG(a->st_mode) && a->st_dev == b->st_dev && a->st_ino == b->st_ino;
+}
+
+static enum ischia_code refuse_input(const char *path, struct ischia_error *err)
+{
+    return FAIL(err, ISCHIA_E_INPUT, "%s is the input; write the results to another file", path);
+}
+
+static enum ischia_code check_folder(const char *path, struct ischia_error *err)
+{
+    const char *slash = strrchr(path, '/');
+    char *folder = slash == NULL ? strdup(".") : strndup(path, (size_t)(slash - path) + 1);
+    CHECK(folder != NULL, err, ISCHIA_E_MEMORY, "out of memory");
+    const int failed = access(folder, W_OK | X_OK);
+    const int reason = errno;
+    free(folder);
+    CHECK(failed == 0, err, ISCHIA_E_IO, "cannot write %s: %s", path, strerror(reason));
+    return ISCHIA_OK;
+}
+
+enum ischia_code file_out_check(const char *path, const char *const *inputs, size_t count,
+                                struct ischia_error *err)
+{
+    struct stat there, input;
+    if (path == NULL || is_dash(path)) return ISCHIA_OK;
+    if (stat(path, &there) != 0) return check_folder(path, err);
+    CHECK(!S_ISDIR(there.st_mode), err, ISCHIA_E_INPUT, "%s is a directory; give a file", path);
+    for (size_t i = 0; i < count; i++)
+        if (inputs[i] != NULL && !is_dash(inputs[i]) && stat(inputs[i], &input) == 0 &&
+            is_same_regular(&there, &input))
+            return refuse_input(path, err);
+    return S_ISREG(there.st_mode) ? check_folder(path, err) : ISCHIA_OK;
 }
 
 /* ---- a file that appears when it is complete ---- */
@@ -128,30 +169,40 @@ enum ischia_code file_out_close(struct file_out *out, enum ischia_code code,
 static bool is_same_file(int fd, FILE *in)
 {
     struct stat a, b;
-    return in != NULL && fstat(fd, &a) == 0 && fstat(fileno(in), &b) == 0 && S_ISREG(a.st_mode) &&
-           a.st_dev == b.st_dev && a.st_ino == b.st_ino;
+    return in != NULL && fstat(fd, &a) == 0 && fstat(fileno(in), &b) == 0 &&
+           is_same_regular(&a, &b);
+}
+
+/* Two writers would cut each other's lines. The lock ends with the process. */
+static enum ischia_code lock_and_empty(const struct line_out *out, struct ischia_error *err)
+{
+    if (!out->is_regular) return ISCHIA_OK;
+    CHECK(flock(out->fd, LOCK_EX | LOCK_NB) == 0, err, ISCHIA_E_INPUT,
+          "%s is being written by another process", out->path);
+    CHECK(ftruncate(out->fd, 0) == 0, err, ISCHIA_E_IO, "cannot write %s: %s", out->path,
+          strerror(errno));
+    return ISCHIA_OK;
+}
+
+static enum ischia_code open_lines(struct line_out *out, FILE *in, struct ischia_error *err)
+{
+    struct stat status;
+    out->fd = open(out->path, O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+    CHECK(out->fd >= 0, err, ISCHIA_E_IO, "cannot write %s: %s", out->path, strerror(errno));
+    out->is_regular = fstat(out->fd, &status) == 0 && S_ISREG(status.st_mode);
+    const enum ischia_code code =
+        is_same_file(out->fd, in) ? refuse_input(out->path, err) : lock_and_empty(out, err);
+    if (code != ISCHIA_OK) (void)close(out->fd);
+    return code;
 }
 
 enum ischia_code line_out_open(struct line_out *ret, const char *path, FILE *in,
                                struct ischia_error *err)
 {
-    struct stat status;
     struct line_out out = {.fd = STDOUT_FILENO, .path = is_dash(path) ? "standard output" : path};
-    if (!is_dash(path)) {
-        out.fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
-        CHECK(out.fd >= 0, err, ISCHIA_E_IO, "cannot write %s: %s", path, strerror(errno));
-        out.is_regular = fstat(out.fd, &status) == 0 && S_ISREG(status.st_mode);
-        if (is_same_file(out.fd, in)) {
-            (void)close(out.fd);
-            return FAIL(err, ISCHIA_E_INPUT, "%s is the input; write the results to another file",
-                        path);
-        }
-        if (out.is_regular && ftruncate(out.fd, 0) != 0) {
-            const int reason = errno;
-            (void)close(out.fd);
-            return FAIL(err, ISCHIA_E_IO, "cannot write %s: %s", path, strerror(reason));
-        }
-    }
+    if (!is_dash(path)) TRY(open_lines(&out, in, err));
+    /* Appending to what is being read would never end. */
+    if (is_dash(path) && is_same_file(out.fd, in)) return refuse_input(out.path, err);
     *ret = out;
     return ISCHIA_OK;
 }

@@ -11,6 +11,9 @@
 
 /* Input and output of the commands: "-" is standard input or output. */
 
+/* What a message calls it. */
+const char *file_name(const char *path);
+
 /*
  * Reads a whole file of at most bytes_max bytes; *ret_text is the caller's to free and ends with a
  * NUL. ISCHIA_E_INPUT: it cannot be opened or is a directory; ISCHIA_E_LIMIT: it is larger;
@@ -24,6 +27,14 @@ ISCHIA_MUST_CHECK enum ischia_code file_read(const char *path, size_t bytes_max,
 ISCHIA_MUST_CHECK enum ischia_code file_open(const char *path, FILE **ret,
                                              struct ischia_error *err);
 void file_close(FILE *in); /* NULL allowed */
+
+/*
+ * Before work that may take hours: can the output go there? inputs: what is read, "-" and NULL
+ * among them skipped; so is a path that is NULL. ISCHIA_E_INPUT: it is one of the inputs, or a
+ * directory; ISCHIA_E_IO: there is no such folder, or nothing may be written there.
+ */
+ISCHIA_MUST_CHECK enum ischia_code file_out_check(const char *path, const char *const *inputs,
+                                                  size_t count, struct ischia_error *err);
 
 /*
  * A file that appears under its name only when it is complete: written beside it, then renamed.
@@ -51,7 +62,8 @@ struct line_out {
     off_t whole; /* bytes of whole lines */
     const char *path;
 };
-/* in: a file that must not be the same as path (NULL: none). ISCHIA_E_INPUT when it is. */
+/* in: a file that must not be the same as path (NULL: none). ISCHIA_E_INPUT when it is, or when
+ * another process writes there. */
 ISCHIA_MUST_CHECK enum ischia_code line_out_open(struct line_out *ret, const char *path, FILE *in,
                                                  struct ischia_error *err);
 ISCHIA_MUST_CHECK enum ischia_code line_out_write(struct line_out *out, const char *lines,

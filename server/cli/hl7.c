@@ -10,10 +10,10 @@
 #include <unistd.h>
 
 #include "api/hl7.h"
+#include "server/address.h"
 #include "server/cli/files.h"
 #include "server/cli/options.h"
 #include "server/cli/run.h"
-#include "server/hl7/address.h"
 #include "server/hl7/mllp.h"
 
 enum { ANSWER_WITHIN_MS = 60 * 1000, READ_BYTES = 4096 };
@@ -44,26 +44,31 @@ static enum ischia_code make_message(const struct ischia_request *request, char 
     return text_out_take(&out, ret, ret_size, err);
 }
 
-/* A message as it is, or one made of a case in JSON. */
-static enum ischia_code read_message(const char *path, char **ret, size_t *ret_size,
-                                     struct ischia_error *err)
+static bool starts_with(const char *text, const char *start)
+{
+    return strncmp(text, start, strlen(start)) == 0;
+}
+
+/* A case in JSON becomes a message; one that is a message already is sent as it is. Returns the
+ * exit status; EXIT_DONE: *ret is the caller's to free. */
+static int read_message(const char *path, bool sends, char **ret, size_t *ret_size)
 {
     struct ischia_request request;
-    struct doc_faults faults;
+    struct ischia_error err;
     char *text = NULL;
     size_t size = 0;
-    TRY(file_read(path, HL7_MESSAGE_BYTES_MAX, &text, &size, err));
-    if (text[strspn(text, " \t\r\n")] != '{') {
+    if (file_read(path, HL7_MESSAGE_BYTES_MAX, &text, &size, &err) != ISCHIA_OK)
+        return report_error("hl7", &err);
+    if (sends && starts_with(text, "MSH")) {
         *ret = text;
         *ret_size = size;
-        return ISCHIA_OK;
+        return EXIT_DONE;
     }
-    doc_faults_init(&faults);
-    enum ischia_code code = case_doc_read(&request, text, size, &json_limits_request, &faults, err);
+    int status = read_request_text("hl7", file_name(path), text, size, NULL, &request);
     free(text);
-    TRY(code);
-    CHECK(faults.count == 0, err, ISCHIA_E_INPUT, "%s", faults.item[0].detail);
-    return make_message(&request, ret, ret_size, err);
+    if (status == EXIT_DONE && make_message(&request, ret, ret_size, &err) != ISCHIA_OK)
+        status = report_error("hl7", &err);
+    return status;
 }
 
 /* ---- the wire ---- */
@@ -175,7 +180,6 @@ int command_hl7(int argc, char **argv)
         .operands_max = 3,
     };
     const char *words[3] = {"", NULL, NULL};
-    struct ischia_error err;
     char *message = NULL;
     size_t size = 0;
     const enum cli_parse parsed = cli_parse_options(&usage, argc, argv, words);
@@ -187,9 +191,8 @@ int command_hl7(int argc, char **argv)
         return EXIT_BAD_INPUT;
     }
     const char *path = sends ? words[2] : words[1];
-    if (read_message(path == NULL ? "-" : path, &message, &size, &err) != ISCHIA_OK)
-        return report_error("hl7", &err);
-    int status = EXIT_DONE;
+    int status = read_message(path == NULL ? "-" : path, sends, &message, &size);
+    if (status != EXIT_DONE) return status;
     if (sends)
         status = send_to(words[1], message, size);
     else

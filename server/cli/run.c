@@ -25,10 +25,13 @@ int report_error(const char *command, const struct ischia_error *err)
 
 static void print_faults(const char *command, const char *path, const struct doc_faults *faults)
 {
+    char name[FILENAME_MAX], detail[ISCHIA_ERROR_MESSAGE_BYTES];
+    text_printable(path, name, sizeof name);
     for (size_t i = 0; i < faults->count; i++)
-        (void)fprintf(stderr, "ischia %s: %s: %s\n", command, path, faults->item[i].detail);
+        (void)fprintf(stderr, "ischia %s: %s: %s\n", command, name,
+                      text_printable(faults->item[i].detail, detail, sizeof detail));
     if (faults->dropped > 0)
-        (void)fprintf(stderr, "ischia %s: %s: and %zu more\n", command, path, faults->dropped);
+        (void)fprintf(stderr, "ischia %s: %s: and %zu more\n", command, name, faults->dropped);
 }
 
 static void print_warnings(const char *command, const char *path, const struct ischia_case *c)
@@ -49,32 +52,38 @@ static bool set_resolution(struct ischia_request *request, const char *name)
     return false;
 }
 
-int read_request(const char *command, const char *path, const char *resolution,
-                 struct ischia_request *ret)
+int read_request_text(const char *command, const char *name, const char *text, size_t length,
+                      const char *resolution, struct ischia_request *ret)
 {
-    const char *name = strcmp(path, "-") == 0 ? "standard input" : path;
     struct doc_faults faults;
     struct ischia_error err;
-    char *text;
-    size_t length;
     doc_faults_init(&faults);
-    if (file_read(path, json_limits_request.bytes_max, &text, &length, &err) != ISCHIA_OK)
-        return report_error(command, &err);
     const enum ischia_code code =
         case_doc_read(ret, text, length, &json_limits_request, &faults, &err);
-    free(text);
-    if (code == ISCHIA_E_INPUT) {
-        (void)fprintf(stderr, "ischia %s: %s: %s\n", command, name, err.message);
-        return EXIT_BAD_INPUT;
-    }
-    if (code != ISCHIA_OK) return report_error(command, &err);
-    if (resolution != NULL && !set_resolution(ret, resolution))
+    if (code == ISCHIA_E_INPUT)
+        doc_faults_add(&faults, "", "malformed", "%s", err.message);
+    else if (code != ISCHIA_OK)
+        return report_error(command, &err);
+    else if (resolution != NULL && !set_resolution(ret, resolution))
         doc_faults_add(&faults, "/resolution", "not_allowed",
                        "resolution is %s; accepted standard, fine, coarse", resolution);
     print_faults(command, name, &faults);
     if (faults.count > 0) return EXIT_BAD_INPUT;
     print_warnings(command, name, &ret->values);
     return EXIT_DONE;
+}
+
+int read_request(const char *command, const char *path, const char *resolution,
+                 struct ischia_request *ret)
+{
+    struct ischia_error err;
+    char *text;
+    size_t length;
+    if (file_read(path, json_limits_request.bytes_max, &text, &length, &err) != ISCHIA_OK)
+        return report_error(command, &err);
+    const int read = read_request_text(command, file_name(path), text, length, resolution, ret);
+    free(text);
+    return read;
 }
 
 static double seconds(clockid_t clock)

@@ -18,6 +18,9 @@ int report_error(const char *command, const struct ischia_error *err);
  */
 int read_request(const char *command, const char *path, const char *resolution,
                  struct ischia_request *ret);
+/* The same of a text that has been read already; name: of the file, for messages. */
+int read_request_text(const char *command, const char *name, const char *text, size_t length,
+                      const char *resolution, struct ischia_request *ret);
 
 /* ischia_solve with wall_s and cpu_s (of this thread) filled in: the solver has no clock. */
 ISCHIA_MUST_CHECK enum ischia_code

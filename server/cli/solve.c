@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "api/result_doc.h"
+#include "server/cli/files.h"
 #include "server/cli/options.h"
 #include "server/cli/run.h"
 #include "server/cli/section_words.h"
@@ -67,11 +68,32 @@ static enum ischia_code compute(const struct solve_options *options,
     return code;
 }
 
-static int solve(const struct solve_options *options, const struct ischia_request *request)
+/* Standard output has the result already. */
+static enum ischia_code check_drawing(const char *option, const char *path,
+                                      const char *const inputs[2], struct ischia_error *err)
+{
+    if (path == NULL) return ISCHIA_OK;
+    CHECK(strcmp(path, "-") != 0, err, ISCHIA_E_INPUT,
+          "%s needs the name of a file: the result goes to standard output", option);
+    CHECK(inputs[1] == NULL || strcmp(path, inputs[1]) != 0, err, ISCHIA_E_INPUT,
+          "--vtu and --svg both name %s", path);
+    return file_out_check(path, inputs, 2, err);
+}
+
+static enum ischia_code check_outputs(const struct solve_options *options, const char *input,
+                                      struct ischia_error *err)
+{
+    TRY(check_drawing("--vtu", options->vtu, (const char *const[]){input, NULL}, err));
+    return check_drawing("--svg", options->svg, (const char *const[]){input, options->vtu}, err);
+}
+
+static int solve(const struct solve_options *options, const char *input,
+                 const struct ischia_request *request)
 {
     struct uncertain_solution solved;
     struct ischia_error err;
     const struct ischia_case *c = &request->values;
+    if (check_outputs(options, input, &err) != ISCHIA_OK) return report_error("solve", &err);
     if (compute(options, request, &solved, &err) != ISCHIA_OK) return report_error("solve", &err);
     const bool converged = ischia_result_converged(&solved.result);
     enum ischia_code code = print_result(options, request, &solved, &err);
@@ -112,5 +134,5 @@ int command_solve(int argc, char **argv)
     const enum cli_parse parsed = cli_parse_options(&usage, argc, argv, &path);
     if (parsed != CLI_RUN) return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
     const int read = read_request("solve", path, options.resolution, &request);
-    return read == EXIT_DONE ? solve(&options, &request) : read;
+    return read == EXIT_DONE ? solve(&options, path, &request) : read;
 }

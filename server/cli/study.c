@@ -40,7 +40,10 @@ int command_study(int argc, char **argv)
     }
     for (int i = 0; i < SUB_COMMANDS; i++)
         if (strcmp(name, sub_commands[i].name) == 0) return sub_commands[i].run(argc - 1, argv + 1);
-    if (argc > 1) (void)fprintf(stderr, "ischia study: there is no command \"%s\"\n", name);
+    char shown[60];
+    if (argc > 1)
+        (void)fprintf(stderr, "ischia study: there is no command \"%s\"\n",
+                      text_printable(name, shown, sizeof shown));
     print_help(stderr);
     return EXIT_BAD_INPUT;
 }
@@ -57,17 +60,20 @@ enum ischia_code study_load_plan(struct study_plan *ret, const char *path,
                                  const struct case_doc_defaults *defaults, struct ischia_error *err)
 {
     struct doc_faults faults;
-    char *text;
+    char *text, shown[ISCHIA_ERROR_MESSAGE_BYTES];
     size_t length;
     doc_faults_init(&faults);
+    struct ischia_error cause;
     TRY(file_read(path, STUDY_PLAN_BYTES_MAX, &text, &length, err));
     const enum ischia_code code =
-        study_plan_read(ret, text, length, defaults, DESIGN_ROWS_MAX, &faults, err);
+        study_plan_read(ret, text, length, defaults, DESIGN_ROWS_MAX, &faults, &cause);
     free(text);
+    CHECK(code == ISCHIA_OK, err, code, "%s: %.400s", file_name(path), cause.message);
     for (size_t i = 0; i < faults.count; i++)
-        (void)fprintf(stderr, "%s: %s\n", faults.item[i].pointer, faults.item[i].detail);
-    TRY(code);
-    CHECK(faults.count == 0, err, ISCHIA_E_INPUT, "%s is not a design that can be run", path);
+        (void)fprintf(stderr, "ischia study: %s: %s: %s\n", file_name(path), faults.item[i].pointer,
+                      text_printable(faults.item[i].detail, shown, sizeof shown));
+    CHECK(faults.count == 0, err, ISCHIA_E_INPUT, "%s is not a design that can be run",
+          file_name(path));
     return ISCHIA_OK;
 }
 

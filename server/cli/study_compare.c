@@ -11,6 +11,7 @@
 
 #include "api/csv.h"
 #include "api/json.h"
+#include "server/cli/files.h"
 #include "server/cli/study.h"
 #include "server/cli/study_table.h"
 #include "solver/case.h"
@@ -384,6 +385,8 @@ static void print_text(const struct comparison *c)
 static enum ischia_code run_comparison(struct comparison *c, struct ischia_error *err)
 {
     const struct arguments *a = c->arguments;
+    TRY(file_out_check(a->output, a->file, 2, err));
+    TRY(file_out_check(a->joined, a->file, 2, err));
     for (int f = 0; f < a->files; f++) TRY(study_table_read(&c->table[f], a->file[f], err));
     TRY(join(c, err));
     TRY(compare_all(c, err));

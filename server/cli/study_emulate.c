@@ -14,6 +14,7 @@
 
 #include "api/json.h"
 #include "api/study_plan.h"
+#include "server/cli/files.h"
 #include "server/cli/study.h"
 #include "server/cli/study_published.h"
 #include "server/cli/study_table.h"
@@ -66,7 +67,8 @@ static enum ischia_code factors_from_columns(struct emulation *e, struct ischia_
         factor.level[1] = column_extent(&e->table, column, 1);
         if (factor.level[1] > factor.level[0]) e->factor[e->factor_count++] = factor;
     }
-    CHECK(e->factor_count > 0, err, ISCHIA_E_INPUT, "no input varies in %s", e->arguments->results);
+    CHECK(e->factor_count > 0, err, ISCHIA_E_INPUT, "no input varies in %s",
+          file_name(e->arguments->results));
     return ISCHIA_OK;
 }
 
@@ -384,6 +386,8 @@ static enum ischia_code fit_degrees(struct emulation *e, struct ischia_error *er
 static enum ischia_code run_emulation(struct emulation *e, struct ischia_error *err)
 {
     const struct arguments *a = e->arguments;
+    const char *const inputs[] = {a->results, a->design, a->published};
+    TRY(file_out_check(a->output, inputs, sizeof inputs / sizeof inputs[0], err));
     TRY(study_table_read(&e->table, a->results, err));
     TRY(a->design != NULL ? factors_from_design(e, err) : factors_from_columns(e, err));
     e->has_published = a->published != NULL;

@@ -15,6 +15,7 @@
 #include "api/study_plan.h"
 #include "server/cli/bar.h"
 #include "server/cli/crew.h"
+#include "server/cli/files.h"
 #include "server/cli/study.h"
 #include "server/cli/study_journal.h"
 #include "server/cli/study_sides.h"
@@ -377,6 +378,7 @@ static enum ischia_code run(struct study *s, struct ischia_error *err)
     s->mine = calloc(rows + 1, sizeof *s->mine);
     s->died = calloc(rows + 1, sizeof *s->died);
     CHECK(s->mine && s->died, err, ISCHIA_E_MEMORY, "out of memory for %zu rows", rows);
+    TRY(file_out_check(a->output, &a->design, 1, err));
     TRY(study_sides_deal(&s->plan.design, &s->plan.points, a->shard, a->shards, s->mine, err));
     return a->points ? write_points(s, err) : run_study(s, err);
 }

@@ -42,10 +42,20 @@ static enum ischia_code take_line(struct merge *m, const char *path, const char 
     return ISCHIA_OK;
 }
 
+/* A spreadsheet or a mail may have changed them. */
+static void unix_line_ends(char *text)
+{
+    char *to = text;
+    for (const char *from = text; *from != '\0'; from++)
+        if (from[0] != '\r' || from[1] != '\n') *to++ = *from;
+    *to = '\0';
+}
+
 static enum ischia_code take_lines(struct merge *m, const char *path, char *text,
                                    struct ischia_error *err)
 {
     const size_t header = strlen(m->header);
+    unix_line_ends(text);
     CHECK(strncmp(text, m->header, header) == 0, err, ISCHIA_E_INPUT,
           "%s does not have the columns of the design", path);
     char *rest = text + header;
@@ -136,7 +146,8 @@ int study_merge(int argc, char **argv)
         free(files);
         return parsed == CLI_HELP_SHOWN ? EXIT_DONE : EXIT_BAD_INPUT;
     }
-    enum ischia_code code = study_load_plan(&merge.plan, files[0], &defaults, &err);
+    enum ischia_code code = file_out_check(output, files, (size_t)argc, &err);
+    if (code == ISCHIA_OK) code = study_load_plan(&merge.plan, files[0], &defaults, &err);
     if (code == ISCHIA_OK) code = run_merge(&merge, files + 1, output, &err);
     merge_finish(&merge);
     free(files);

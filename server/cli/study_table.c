@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "server/cli/study_table.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +8,7 @@
 
 #include "api/csv.h"
 #include "api/text.h"
+#include "server/cli/files.h"
 
 void study_table_finish(struct study_table *table)
 {
@@ -62,16 +62,16 @@ enum ischia_code study_table_read(struct study_table *ret, const char *path,
 {
     struct study_table table = {0};
     struct ischia_error cause;
-    FILE *in = fopen(path, "re");
-    CHECK(in != NULL, err, ISCHIA_E_IO, "%s cannot be read: %s", path, strerror(errno));
+    FILE *in = NULL;
+    TRY(file_open(path, &in, err));
     const enum ischia_code code = read_lines(&table, in, &cause);
-    (void)fclose(in);
+    file_close(in);
     if (code == ISCHIA_OK) {
         *ret = table;
         return ISCHIA_OK;
     }
     study_table_finish(&table);
-    return FAIL(err, code, "%s: %.400s", path, cause.message);
+    return FAIL(err, code, "%s: %.400s", file_name(path), cause.message);
 }
 
 int study_table_column(const struct study_table *table, const char *name)

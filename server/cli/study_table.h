@@ -14,7 +14,8 @@ struct study_table {
     char **cell; /* [rows + 1][columns]; line 0 is the header; short lines end in "" */
 };
 
-/* ISCHIA_E_INPUT: not CSV, no header, a line with more fields than the header. */
+/* path: "-" is standard input. ISCHIA_E_INPUT: cannot be opened, not CSV, no header, a line with
+ * more fields than the header. */
 ISCHIA_MUST_CHECK enum ischia_code study_table_read(struct study_table *ret, const char *path,
                                                     struct ischia_error *err);
 void study_table_finish(struct study_table *table); /* a zeroed one is allowed */

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the tests of the program share: how it is run, and a good case."""
 import os
+import pty
 import subprocess
 import sys
 import tempfile
@@ -17,6 +18,24 @@ def run(*arguments, stdin=b"", timeout=600, **more):
         stdin = stdin.encode()
     return subprocess.run([*UNDER, PROGRAM, *arguments], input=stdin, capture_output=True,
                           timeout=timeout, **more)
+
+
+def on_terminal(*arguments, stdin, TERM="xterm"):
+    """What a terminal is sent when both outputs go there."""
+    ours, theirs = pty.openpty()
+    with subprocess.Popen([PROGRAM, *arguments], stdin=subprocess.PIPE, stdout=theirs, stderr=theirs,
+                          env={**os.environ, "TERM": TERM}) as program:
+        os.close(theirs)
+        program.stdin.write(stdin.encode())
+        program.stdin.close()
+        shown = b""
+        try:
+            while piece := os.read(ours, 65536):
+                shown += piece
+        except OSError:  # how Linux tells that nobody writes there any more
+            pass
+        os.close(ours)
+        return shown.decode()
 
 
 class Case(unittest.TestCase):
@@ -39,7 +58,7 @@ class Case(unittest.TestCase):
         if lines is not None:
             self.assertEqual(len(errors.splitlines()), lines, errors)
         for line in errors.splitlines():
-            self.assertRegex(line, r"^ischia( [a-z-]+)?: .")
+            self.assertRegex(line, r"^ischia( [a-z0-9-]+)?: .")
         return errors
 
 

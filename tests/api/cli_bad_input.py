@@ -2,9 +2,11 @@
 """Bad input and bad usage: one clear line a fault, exit status 2, nothing on stdout."""
 import json
 import math
+import os
+import subprocess
 
 import cli
-from cli import GOOD, HEADER, run
+from cli import GOOD, HEADER, PROGRAM, UNDER, run
 
 
 def case(**changes):
@@ -27,6 +29,9 @@ class BadCase(cli.Case):
                 (case(muM=-1), ["muM is -1 kPa; accepted 0.5 to 30 kPa"]),
                 (case(F=0), ["F is 0 N; accepted 1 to 600 N"]),
                 (case(eM=1e308), ["eM is 1e+308 mm; accepted 5 to 60 mm"]),
+                (case(F=600.0001), ["F is 600.0001 N; accepted 1 to 600 N"]),
+                (case(F=0.999999999), ["F is 0.999999999 N; accepted 1 to 600 N"]),
+                (case(R1=9.00000001, R2=9), ["R2 is 9 mm and R1 is 9.00000001 mm"]),
                 (case(eM="31"), ['eM is "31"; accepted a number from 5 to 60 mm']),
                 (case(eM=[31]), ["eM is an array; accepted a number from 5 to 60 mm"]),
                 (case(eM=None), ["eM is missing; accepted 5 to 60 mm"]),
@@ -99,6 +104,13 @@ class BadCohort(cli.Case):
         self.assertIn("is the input", self.assertEnds(run("cohort", path, "-o", path), 2, 1))
         with open(path) as file:
             self.assertEqual(file.read(), HEADER + "\n")
+        with open(path, "a") as end:  # what is appended would be read again
+            done = subprocess.run([*UNDER, PROGRAM, "cohort", path], stdout=end,
+                                  stderr=subprocess.PIPE, timeout=600)
+        self.assertIn("standard output is the input", self.assertEnds(done, 2, 1))
+        utf16 = self.write("utf16.csv", HEADER.encode("utf-16"))
+        self.assertIn(utf16 + ": line 1: a NUL byte, as in UTF-16; save the file as UTF-8",
+                      self.assertEnds(run("cohort", utf16), 2, 1))
 
     def test_rows_of_nothing_but_bad_input(self):
         rows = ["7,22,31,10,8,5", "7,22,31,10,\"8,0\",5,258", "7,22,31,10,nan,5,258",
@@ -111,6 +123,56 @@ class BadCohort(cli.Case):
         self.assertEqual(len(output), 8)
         for line in output[1:]:
             self.assertIn(",refused,", line)
+
+
+class BadOutput(cli.Case):
+    """Found before anything is solved; what is there stays as it was."""
+
+    def refuse(self, word, *arguments, status=2):
+        done = run(*arguments)
+        self.assertIn(word, self.assertEnds(done, status, 1))
+        self.assertEqual(done.stdout, b"")
+
+    def test_an_output_that_is_an_input(self):
+        path = self.write("case.json", case())
+        for arguments in (["solve", path, "--vtu", path], ["solve", path, "--svg", path],
+                          ["export", "--inp", path, "-o", path]):
+            self.refuse(path + " is the input", *arguments)
+        link = self.path("link.json")
+        os.symlink(path, link)
+        self.refuse("is the input", "solve", path, "--vtu", link)
+        with open(path) as file:
+            self.assertEqual(file.read(), case())
+
+    def test_two_outputs_in_one_place(self):
+        path = self.write("case.json", case())
+        self.refuse("--vtu and --svg both name", "solve", path, "--vtu", self.path("x"), "--svg", self.path("x"))
+        for option in ("--vtu", "--svg"):
+            self.refuse(option + " needs the name of a file", "solve", path, option, "-")
+
+    def test_where_nothing_can_be_written(self):
+        path = self.write("case.json", case())
+        self.refuse("is a directory; give a file", "solve", path, "--vtu", self.folder.name)
+        self.refuse("is a directory; give a file", "export", "--svg", path, "-o", self.folder.name)
+        self.refuse("No such file or directory", "solve", path, "--svg", self.path("no/x"), status=1)
+
+
+class BadMessage(cli.Case):
+    def test_what_is_no_side_is_no_message(self):
+        for text in ("", "garbage", "[1]", HEADER, "MSH|^~\\&|"):
+            done = run("hl7", "message", stdin=text)
+            self.assertIn("not JSON" if text != "[1]" else "object", self.assertEnds(done, 2, 1))
+            self.assertEqual(done.stdout, b"")
+
+    def test_every_fault_is_a_line(self):
+        errors = self.assertEnds(run("hl7", "message", stdin=case(muM=80, F=None)), 2, 2)
+        self.assertIn("standard input: muM is 80 kPa; accepted 0.5 to 30 kPa", errors)
+
+    def test_what_is_no_message_is_not_sent(self):
+        for text in ("", "garbage", HEADER):
+            self.assertIn("not JSON", self.assertEnds(run("hl7", "send", "127.0.0.1:1", stdin=text), 2, 1))
+        for address, word in (("x", "is not HOST:PORT"), ("127.0.0.1:70000", "not one of 0 to 65535")):
+            self.assertIn(word, self.assertEnds(run("hl7", "send", address, stdin=case()), 2, 1))
 
 
 class BadUsage(cli.Case):
@@ -132,6 +194,7 @@ class BadUsage(cli.Case):
         self.assertEqual(run().returncode, 2)
 
     def test_help(self):
+        self.assertIn(b"Usage: ischia study merge", run("help", "study", "merge").stdout)
         overview = run("help").stdout.decode()
         for command in ("solve", "cohort", "export", "check-tangent", "version"):
             with self.subTest(command):

@@ -194,6 +194,38 @@ class Cohort(cli.Case):
                                   stdout=full, stderr=subprocess.PIPE, timeout=600)
         self.assertIn("No space left", self.assertEnds(done, 1, 1))
 
+    def test_one_writer_a_file(self):
+        output = self.path("out.csv")
+        with subprocess.Popen([PROGRAM, "cohort", "-o", output], stdin=subprocess.PIPE) as first:
+            first.stdin.write("\n".join([HEADER, row(200), row(SLOW), row(SLOW)]).encode())
+            first.stdin.close()
+            deadline = time.monotonic() + 200
+            while time.monotonic() < deadline and not (os.path.exists(output) and os.path.getsize(output)):
+                time.sleep(0.02)
+            done = run("cohort", "-o", output, stdin=HEADER + "\n" + row(201))
+            self.assertIn("is being written by another process", self.assertEnds(done, 2, 1))
+            self.assertEqual(first.wait(timeout=200), 0)
+        with open(output) as file:
+            self.assertEqual([r["F_N"] for r in table(file.read())], ["200", str(SLOW), str(SLOW)])
+
+    def test_without_standard_error_messages_go_nowhere(self):
+        output = self.path("out.csv")
+        done = subprocess.run(["/bin/sh", "-c", "exec \"$0\" cohort -o \"$1\" 2>&-", PROGRAM, output],
+                              input=("%s\n%s\nNaN,1\n" % (HEADER, row(200))).encode(), timeout=600)
+        self.assertEqual(done.returncode, 2)
+        with open(output, "rb") as file:
+            self.assertEqual([line.count(b",") for line in file.read().splitlines()], [24, 24, 24])
+
+    def test_a_bar_and_rows_on_one_terminal(self):
+        text = "%s\n%s\n%s\n" % (HEADER, row(200), row(201))
+        shown = cli.on_terminal("cohort", stdin=text)
+        self.assertIn("rows, 0 failed, 0 refused\x1b[K", shown)
+        for line in shown.splitlines():  # of what is left of it when the bar has been wiped
+            self.assertRegex(line.rpartition("\x1b[K")[2], r"^(R1_mm,|7\.1,|ischia cohort: |$)")
+        plain = cli.on_terminal("cohort", stdin=text, TERM="dumb")
+        self.assertNotIn("\x1b", plain)
+        self.assertEqual(len(plain.splitlines()), 3)
+
     def test_a_file_size_limit_leaves_whole_lines(self):
         text = HEADER + "\n" + "".join(row(100 + i) + "\n" for i in range(60))
         output = self.path("out.csv")

@@ -266,7 +266,7 @@ class Hl7(unittest.TestCase):
         self.assertEqual(send(shown.stdout, 'send', address).returncode, 0)
         self.assertEqual(send('MSH|^~\\&|x', 'send', address).returncode, 1)
         self.assertEqual(send('{"R1": 1}', 'send', address).returncode, 2)
-        self.assertEqual(send('', 'send', '127.0.0.1:1').returncode, 1)
+        self.assertEqual(send('MSH|^~\\&|', 'send', '127.0.0.1:1').returncode, 1)
         self.assertEqual(send('', 'send').returncode, 2)
 
 

@@ -320,6 +320,11 @@ class Shards(InTemporaryFolder):
         self.assertEqual(
             (self.path / "merged.csv").read_bytes(), (self.path / "whole.csv").read_bytes()
         )
+        shards[0].write_bytes(shards[0].read_bytes().replace(b"\n", b"\r\n"))
+        run("merge", TABLE1, *shards, "-o", self.path / "merged.csv")
+        self.assertEqual(
+            (self.path / "merged.csv").read_bytes(), (self.path / "whole.csv").read_bytes()
+        )
         said = run("merge", TABLE1, *shards[:4], "-o", self.path / "m.csv", status=2).stderr
         self.assertIn("435 of 2187 rows are in no shard, the first is row 13", said)
 
@@ -534,6 +539,54 @@ class Comparison(InTemporaryFolder):
         self.assertIn("key column", run("compare", a, b, "--key", "person", status=2).stderr)
         self.assertIn("no column", run("compare", a, b, "--b-column", "eps", status=2).stderr)
         run("compare", status=2)
+
+
+class Files(InTemporaryFolder):
+    def test_an_output_never_replaces_an_input(self):
+        design, results = self.path / "d.json", self.path / "r.csv"
+        design.write_bytes(pathlib.Path(TABLE1).read_bytes())
+        results.write_text("R1,eps_max\n1,2\n2,3\n")
+        for arguments in (
+            ("factorial", design, "-o", design),
+            ("factorial", design, "--points", "-o", design),
+            ("merge", design, results, "-o", results),
+            ("emulate", results, "-o", results),
+            ("emulate", results, "--design", design, "-o", design),
+            ("compare", results, "-o", results),
+            ("compare", results, "--table", results),
+        ):
+            before = design.read_bytes(), results.read_bytes()
+            self.assertIn("is the input", run(*arguments, status=2).stderr)
+            self.assertEqual((design.read_bytes(), results.read_bytes()), before)
+
+    def test_where_a_result_cannot_go_is_said_before_the_work(self):
+        said = run("factorial", TABLE1, "-o", self.path, status=2).stderr
+        self.assertIn("is a directory; give a file", said)
+        run("factorial", TABLE1, "-o", self.path / "no/o.csv", status=1)
+        self.assertEqual(list(self.path.iterdir()), [])
+
+    def test_what_cannot_be_read_is_bad_input(self):
+        for command in ("emulate", "compare"):
+            for path, word in ((self.path / "none", "cannot open"), (self.path, "is a directory")):
+                self.assertIn(word, run(command, path, status=2).stderr)
+        (self.path / "d.json").write_text('{"nam": 1}')
+        said = run("factorial", self.path / "d.json", "-o", self.path / "o.csv", status=2).stderr
+        for line in said.splitlines():
+            self.assertTrue(line.startswith("ischia study"), line)
+            self.assertIn(str(self.path / "d.json"), line)
+        (self.path / "d.json").write_text("{")
+        said = run("factorial", self.path / "d.json", "-o", self.path / "o.csv", status=2).stderr
+        self.assertIn(f"{self.path / 'd.json'}: not JSON", said)
+
+    def test_results_come_through_a_pipe_too(self):
+        done = subprocess.run(
+            [PROGRAM, "study", "emulate", "-"],
+            input="eps_max\n1\n2\n",
+            capture_output=True,
+            text=True,
+            timeout=600,
+        )
+        self.assertIn("no input varies in standard input", done.stderr)
 
 
 class Help(unittest.TestCase):
