@@ -22,7 +22,8 @@ PAGE = Path(__file__).resolve().parent / "CAPACITY.md"
 
 # name: (value, unit, what it is and where it comes from)
 FIGURES = {
-    "solve_s": (5.0, "CPU s", "one standard solve; README, `ischia solve examples/table2_1R.json`"),
+    "solve_s": (5.0, "CPU s", "one standard solve, rounded up; the slower machine of "
+                             "PERFORMANCE.md has a median of 4.2, the faster one of 1.3"),
     "solve_spread": (0.35, "", "standard deviation over mean of solves; the sides of Table 2"),
     "commit_ms": (2.0, "ms", "one group commit of the database with its disk; assumed, `pg_test_fsync` measures it"),
     "group": (64, "", "transactions of one machine that share a commit at most; server/store/store_postgresql.c"),
