@@ -214,7 +214,7 @@ void handle_fhir_read(struct call *call, struct http_response *ret)
 struct search {
     char person[VALUE_BYTES], reference[VALUE_BYTES], cursor[STORE_CURSOR_BYTES];
     struct uuid id;
-    bool by_id, nothing; /* nothing: no row can match */
+    bool nothing; /* no row can match */
     struct store_filter filter;
     struct text_out query; /* what was understood, for links; without the cursor */
     struct doc_faults faults;
@@ -286,8 +286,12 @@ static bool take_status(struct search *s, const char *value)
 
 static bool take_id(struct search *s, const char *value)
 {
-    s->by_id = uuid_parse(value, &s->id);
-    s->nothing = s->nothing || !s->by_id;
+    struct uuid id;
+    const bool fits = uuid_parse(value, &id) && (s->filter.id == NULL || uuid_equal(&id, &s->id));
+    s->nothing = s->nothing || !fits;
+    if (!fits) return true;
+    s->id = id;
+    s->filter.id = &s->id;
     return true;
 }
 
@@ -452,17 +456,6 @@ static void put_link(struct page *page, const char *relation, const struct searc
     text_out_finish(&url);
 }
 
-static enum ischia_code one_entry(struct call *call, const struct search *s, struct page *page)
-{
-    struct store_assessment row;
-    enum store_answer answer = STORE_NOT_FOUND;
-    memset(&row, 0, sizeof row);
-    TRY(store_get(call->service->store, &s->id, &row, &answer, &page->err));
-    if (answer == STORE_DONE) (void)write_entry(page, &row);
-    store_assessment_finish(&row);
-    return page->code;
-}
-
 static enum ischia_code write_bundle(struct call *call, const struct search *s, struct page *page)
 {
     char cursor[STORE_CURSOR_BYTES] = "";
@@ -470,9 +463,7 @@ static enum ischia_code write_bundle(struct call *call, const struct search *s, 
     json_put_string(&page->out, "resourceType", "Bundle");
     json_put_string(&page->out, "type", "searchset");
     json_open_array(&page->out, "entry");
-    if (s->by_id && !s->nothing)
-        TRY(one_entry(call, s, page));
-    else if (!s->nothing)
+    if (!s->nothing)
         TRY(store_list(call->service->store, &s->filter, write_entry, page, cursor, &page->err));
     TRY(page->code);
     json_close_array(&page->out);

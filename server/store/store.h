@@ -170,9 +170,10 @@ store_get_field(struct store *store, const struct uuid *id, unsigned char **ret_
                 size_t *ret_size, enum store_answer *ret_answer, struct ischia_error *err);
 
 struct store_filter {
-    const char *subject; /* NULL: any                                                      */
-    const char *side;    /* NULL: any                                                      */
-    bool by_state;       /* false: any                                                     */
+    const struct uuid *id; /* NULL: any                                                    */
+    const char *subject;   /* NULL: any                                                    */
+    const char *side;      /* NULL: any                                                    */
+    bool by_state;         /* false: any                                                   */
     enum queue_state state;
     unsigned states;       /* bits of enum queue_state; 0: any                            */
     const char *person[2]; /* a subject and a reference: either fits; both NULL: any      */

@@ -205,8 +205,9 @@ static void list_text(const struct db *db, const struct store_filter *filter,
         ret, LIST_TEXT_BYTES,
         "SELECT %s FROM assessment a LEFT JOIN solution s ON s.rowid = a.solution "
         "LEFT JOIN origin o ON o.assessment = a.seq "
-        "WHERE a.seq < ?%s%s%s%s%s%s ORDER BY a.seq DESC LIMIT ?",
-        sql_assessment_columns, filter->subject == NULL ? "" : " AND a.subject = ?",
+        "WHERE a.seq < ?%s%s%s%s%s%s%s ORDER BY a.seq DESC LIMIT ?",
+        sql_assessment_columns, filter->id == NULL ? "" : " AND a.id = ?",
+        filter->subject == NULL ? "" : " AND a.subject = ?",
         filter->side == NULL ? "" : " AND a.side = ?", filter->by_state ? " AND a.state = ?" : "",
         filter->states == 0 ? "" : sql_for(db->engine, &sql_piece[SQL_PIECE_STATES]),
         !has_person(filter) ? ""
@@ -261,6 +262,7 @@ static enum ischia_code list_from(struct db *db, struct listing *listing, int64_
     struct query query;
     query_begin_text(&query, db, text);
     query_put_integer(&query, before);
+    if (filter->id != NULL) query_put_blob(&query, filter->id->byte, UUID_BYTES);
     if (filter->subject != NULL) query_put_text(&query, filter->subject);
     if (filter->side != NULL) query_put_text(&query, filter->side);
     if (filter->by_state) query_put_integer(&query, (int64_t)filter->state);

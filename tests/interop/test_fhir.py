@@ -364,11 +364,18 @@ class Fhir(unittest.TestCase):
             ('&status=unknown', 0),
             (f'&_id={seen[1]}', 1),
             ('&_id=x', 0),
+            (f'&_id={seen[1]}&status=final', 1),
+            (f'&_id={seen[1]}&status=cancelled', 0),
+            (f'&_id={seen[1]}&date=lt{day}', 0),
+            (f'&_id={seen[1]}&_id={seen[1].upper()}', 1),
+            (f'&_id={seen[1]}&_id={seen[2]}', 0),
         ):
             found = self.get((base + query).replace('|', '%7C')).json()
             self.assertEqual(found['total'], count, query)
             self.assertEqual(found['type'], 'searchset')
         self.assertEqual(self.get('RiskAssessment?patient=search').json()['total'], 3)
+        others = self.get(f'RiskAssessment?patient=nobody&_id={seen[1]}').json()
+        self.assertEqual((others['total'], others['entry']), (0, []))
         reports = self.emit(self.get('DiagnosticReport?patient=search'))
         self.assertEqual(reports['total'], 3)
         form = {'Content-Type': 'application/x-www-form-urlencoded'}

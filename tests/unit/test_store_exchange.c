@@ -175,6 +175,15 @@ static void test_searching_by_person_state_and_time(void **state)
     solve_all(store);
     clock_ms += HOUR_MS;
     (void)accept_of(store, 2, NULL);
+    assert_int_equal(list(store, (struct store_filter){.id = &one.id}), 1);
+    assert_int_equal(list(store, (struct store_filter){.id = &one.id, .person = {"P-018", NULL}}),
+                     0);
+    assert_int_equal(
+        list(store, (struct store_filter){.id = &one.id, .states = 1U << QUEUE_QUEUED}), 0);
+    assert_int_equal(list(store, (struct store_filter){.id = &one.id,
+                                                       .person = {"x", "Patient/1"},
+                                                       .finished_from_ms = begun_ms}),
+                     1);
     assert_int_equal(list(store, (struct store_filter){.person = {"nobody", "Patient/1"}}), 1);
     assert_int_equal(list(store, (struct store_filter){.person = {"P-017", "Patient/2"}}), 2);
     assert_int_equal(list(store, (struct store_filter){.person = {"nobody", "Patient/2"}}), 0);
