@@ -373,10 +373,25 @@ static void take_pairs(struct search *s, const char *pairs)
     }
 }
 
+/* A body is never left out: without it the search would be a wider one. */
+static enum ischia_code take_form(struct search *s, const struct http_request *request,
+                                  struct ischia_error *err)
+{
+    char *form = strndup(request->body, request->body_size);
+    CHECK(form != NULL, err, ISCHIA_E_MEMORY, "no memory for a search's form");
+    if (strlen(form) == request->body_size)
+        take_pairs(s, form);
+    else
+        doc_faults_add(&s->faults, "query", "malformed", "the form holds a NUL");
+    free(form);
+    return ISCHIA_OK;
+}
+
 /* False: ret is the refusal. */
 static bool read_search(struct call *call, struct search *s, struct http_response *ret)
 {
     struct problem problem;
+    struct ischia_error err;
     const char *prefer = http_request_header(call->request, "Prefer");
     const bool lenient = prefer != NULL && strstr(prefer, "handling=lenient") != NULL;
     memset(s, 0, sizeof *s);
@@ -385,9 +400,10 @@ static bool read_search(struct call *call, struct search *s, struct http_respons
     s->filter.limit = COUNT_USUAL;
     s->filter.with_results = true;
     take_pairs(s, call->request->query);
-    char *form = strndup(call->request->body, call->request->body_size);
-    if (form != NULL) take_pairs(s, form);
-    free(form);
+    if (take_form(s, call->request, &err) != ISCHIA_OK) {
+        reply_failure(call->request, ret, &err);
+        return false;
+    }
     if (s->faults.dropped > 0 && !lenient)
         doc_faults_add(&s->faults, "query", "unsupported",
                        "a search parameter is not known here; Prefer: handling=lenient ignores it");
@@ -452,7 +468,7 @@ static void put_link(struct page *page, const char *relation, const struct searc
     json_put_string(&page->out, "relation", relation);
     json_put_string(&page->out, "url", url.text == NULL ? page->base : url.text);
     json_close_object(&page->out);
-    page->out.text.failed = page->out.text.failed || url.failed;
+    page->out.text.failed = page->out.text.failed || url.failed || s->query.failed;
     text_out_finish(&url);
 }
 
