@@ -319,9 +319,13 @@ static bool take_nothing(struct search *s, const char *value)
 const char *const fhir_search_keys[] = {"subject",      "subject:Patient", "patient", "date",
                                         "_lastUpdated", "status",          "_id",     "_count",
                                         "_cursor",      "_format",         "_pretty", NULL};
-static bool (*const takers[])(struct search *s, const char *value) = {
-    take_person, take_person, take_person, take_date,    take_last_updated, take_status,
-    take_id,     take_count,  take_cursor, take_nothing, take_nothing};
+static const struct {
+    bool (*take)(struct search *s, const char *value);
+    bool single; /* a list of values is refused; escapes are undone */
+} takers[] = {{take_person, true},   {take_person, true},       {take_person, true},
+              {take_date, true},     {take_last_updated, true}, {take_status, false},
+              {take_id, true},       {take_count, false},       {take_cursor, false},
+              {take_nothing, false}, {take_nothing, false}};
 _Static_assert(sizeof takers / sizeof takers[0] + 1 ==
                    sizeof fhir_search_keys / sizeof fhir_search_keys[0],
                "each key has its taker");
@@ -341,13 +345,34 @@ static void put_encoded(struct text_out *out, const char *text)
     }
 }
 
+/* FHIR's escapes undone (of ',' '$' '|' and the backslash itself). False at a comma that has none:
+ * it stands between the values of a list. */
+static bool unescape_single(const char *value, char ret[VALUE_BYTES])
+{
+    for (; *value != '\0' && *value != ','; value++) {
+        if (value[0] == '\\' && value[1] != '\0' && strchr(",$|\\", value[1]) != NULL) value++;
+        *ret++ = *value;
+    }
+    *ret = '\0';
+    return *value == '\0';
+}
+
+static void take_value(struct search *s, int i, const char *value)
+{
+    char plain[VALUE_BYTES];
+    const char *key = fhir_search_keys[i];
+    if (takers[i].single && !unescape_single(value, plain))
+        doc_faults_add(&s->faults, key, "unsupported",
+                       "%s takes one value here; a list (a comma) is not supported", key);
+    else if (!takers[i].take(s, takers[i].single ? plain : value))
+        doc_faults_add(&s->faults, key, "malformed", "%s has a value that is not accepted", key);
+}
+
 static void take_pair(struct search *s, const char *key, const char *value)
 {
     for (int i = 0; fhir_search_keys[i] != NULL; i++) {
         if (strcmp(fhir_search_keys[i], key) != 0) continue;
-        if (!takers[i](s, value))
-            doc_faults_add(&s->faults, key, "malformed", "%s has a value that is not accepted",
-                           key);
+        take_value(s, i, value);
         if (strcmp(key, "_cursor") == 0) return;
         text_put_string(&s->query, s->query.length == 0 ? "" : "&");
         put_encoded(&s->query, key);

@@ -388,9 +388,28 @@ class Fhir(unittest.TestCase):
             answer = self.get('RiskAssessment?' + bad)
             self.assertEqual(answer.status, 400, bad)
             issues(answer)
+        for several in ('subject=search,nobody', 'patient=nobody%2Csearch', 'subject=,',
+                        'subject:Patient=a,b', f'_id={seen[0]},{seen[1]}', 'date=2025,2026',
+                        '_lastUpdated=2025,2026', 'subject=a%5C%5C,b'):
+            answer = self.get('RiskAssessment?' + several, Prefer='handling=lenient')
+            self.assertEqual(answer.status, 400, several)
+            self.emit(answer)
+            (issue,) = issues(answer)
+            self.assertEqual(issue['code'], 'not-supported')
+            self.assertRegex(issue['diagnostics'], 'takes one value here')
         lenient = self.get(base + '&colour=red', Prefer='handling=lenient')
         self.assertEqual(lenient.json()['total'], 3)
         self.assertNotIn('colour', lenient.json()['link'][0]['url'])
+
+    def test_a_comma_of_the_value_itself_is_escaped(self):
+        person = 'https://ehr.example/fhir/Patient/9,$1'
+        risk = resources(self.assess(subject=person, F=384), 'RiskAssessment')[0]
+        self.assertEqual(risk['subject'], {'reference': person})
+        for written in (person.replace(',', '%5C,'), person.replace(',$', '%5C,%5C$')):
+            page = self.emit(self.get('RiskAssessment?subject=' + written))
+            self.assertEqual([r['id'] for r in resources(page, 'RiskAssessment')], [risk['id']])
+            link = page['link'][0]['url'].split('/fhir/')[1]
+            self.assertEqual(self.get(link).json()['total'], 1)
 
     def test_representations_and_errors(self):
         self.assertEqual(self.get('metadata?_format=json').status, 200)
