@@ -105,6 +105,9 @@ bool fhir_date_span(const char *text, int64_t *ret_lo, int64_t *ret_hi)
     return true;
 }
 
+/* 0 says that there is no bound; nothing that is looked for is older than 1970. */
+static int64_t bound(int64_t ms) { return ms < 1 ? 1 : ms; }
+
 bool fhir_date_narrow(const char *value, int64_t *lo, int64_t *hi)
 {
     static const struct {
@@ -124,8 +127,8 @@ bool fhir_date_narrow(const char *value, int64_t *lo, int64_t *hi)
         p++;
     if (p == sizeof prefixes / sizeof prefixes[0]) return false;
     if (!fhir_date_span(plain ? value : value + 2, &first, &end)) return false;
-    const int64_t from = prefixes[p].from_end ? end : first;
-    const int64_t until = prefixes[p].until_end ? end : first;
+    const int64_t from = bound(prefixes[p].from_end ? end : first);
+    const int64_t until = bound(prefixes[p].until_end ? end : first);
     if (prefixes[p].from && from > *lo) *lo = from;
     if (prefixes[p].until && (*hi == 0 || until < *hi)) *hi = until;
     return true;

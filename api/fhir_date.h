@@ -10,7 +10,8 @@
 bool fhir_date_span(const char *text, int64_t *ret_lo, int64_t *ret_hi);
 
 /* A date search parameter ("ge2026-03-01"; prefixes eq ge gt le lt sa eb) narrows the range
- * [*lo, *hi); a hi of 0 is no bound. False when it is malformed or of another prefix. */
+ * [*lo, *hi) of times after 1970-01-01T00:00:00Z; 0 is no bound, and one at or before that moment
+ * becomes 1. False when it is malformed or of another prefix. */
 bool fhir_date_narrow(const char *value, int64_t *lo, int64_t *hi);
 
 #endif

@@ -177,8 +177,9 @@ struct store_filter {
     enum queue_state state;
     unsigned states;       /* bits of enum queue_state; 0: any                            */
     const char *person[2]; /* a subject and a reference: either fits; both NULL: any      */
-    int64_t finished_from_ms, finished_before_ms; /* 0: no bound                          */
-    int64_t changed_from_ms, changed_before_ms;   /* 0: no bound                          */
+    /* 0: no bound. What has not ended fits no bound on its end. */
+    int64_t finished_from_ms, finished_before_ms;
+    int64_t changed_from_ms, changed_before_ms; /* 0: no bound                          */
     int limit;          /* 1 ... STORE_LIST_LIMIT_MAX                                     */
     const char *cursor; /* NULL: from the newest; else what an earlier page returned      */
     bool with_results;  /* false: result_json and problem_json stay NULL                  */

@@ -178,6 +178,13 @@ static bool has_times(const struct store_filter *filter)
 
 static int64_t upper(int64_t bound_ms) { return bound_ms == 0 ? INT64_MAX : bound_ms; }
 
+/* finished_ms is 0 until the end. */
+static int64_t finished_from(const struct store_filter *filter)
+{
+    const bool must_have_ended = filter->finished_from_ms == 0 && filter->finished_before_ms != 0;
+    return must_have_ended ? 1 : filter->finished_from_ms;
+}
+
 static void put_exchange_bounds(struct query *query, const struct store_filter *filter)
 {
     if (filter->states != 0) query_put_integer(query, (int64_t)filter->states);
@@ -186,7 +193,7 @@ static void put_exchange_bounds(struct query *query, const struct store_filter *
         query_put_text(query, filter->person[1]);
     }
     if (!has_times(filter)) return;
-    query_put_integer(query, filter->finished_from_ms);
+    query_put_integer(query, finished_from(filter));
     query_put_integer(query, upper(filter->finished_before_ms));
     query_put_integer(query, filter->changed_from_ms);
     query_put_integer(query, upper(filter->changed_before_ms));

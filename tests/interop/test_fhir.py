@@ -314,6 +314,10 @@ class Fhir(unittest.TestCase):
         self.assertEqual(registered['status'], 'registered')
         self.assertNotIn('prediction', registered)
         self.emit(self.get('DiagnosticReport/' + identity))
+        for query, count in (('', 1), ('&date=lt1970-01-01', 0), ('&date=le2099', 0), ('&date=ge1969', 0),
+                             ('&_lastUpdated=lt1970', 0), ('&_lastUpdated=ge1969', 1)):
+            found = self.get(f'RiskAssessment?_id={identity}' + query).json()
+            self.assertEqual(found['total'], count, query)
         self.assertEqual(self.get(f'Observation/{identity}-eps-max').status, 404)
         self.assertEqual(self.get(f'Observation/{identity}-R1').status, 200)
         self.assertEqual(self.service.ask('DELETE', where).status, 202)

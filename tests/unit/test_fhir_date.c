@@ -125,6 +125,28 @@ static void test_prefixes_narrow_a_range(void **state)
     assert_false(fhir_date_narrow("", &lo, &hi));
 }
 
+static void test_a_bound_before_1970_is_one(void **state)
+{
+    static const struct {
+        const char *value;
+        int64_t lo, hi;
+    } rows[] = {
+        {"lt1970-01-01", 0, 1}, {"eb1970", 0, 1},
+        {"le1969", 0, 1},       {"lt0001", 0, 1},
+        {"1969-07-20", 1, 1},   {"ge1970", 1, 0},
+        {"gt1900", 1, 0},       {"1970-01-01T00:00:00.000Z", 1, 1},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        int64_t lo = 0, hi = 0;
+        assert_true(fhir_date_narrow(rows[i].value, &lo, &hi));
+        assert_int_equal(lo, rows[i].lo);
+        assert_int_equal(hi, rows[i].hi);
+        assert_true(fhir_date_narrow("lt2026", &lo, &hi)); /* widens nothing */
+        assert_int_equal(hi, rows[i].hi == 0 ? at(2026, 1, 1, 0, 0, 0) : rows[i].hi);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -132,6 +154,7 @@ int main(void)
         cmocka_unit_test(test_days_over_four_centuries),
         cmocka_unit_test(test_what_is_no_date),
         cmocka_unit_test(test_prefixes_narrow_a_range),
+        cmocka_unit_test(test_a_bound_before_1970_is_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -192,6 +192,9 @@ static void test_searching_by_person_state_and_time(void **state)
     assert_int_equal(list(store, (struct store_filter){.finished_from_ms = begun_ms + HOUR_MS}), 1);
     assert_int_equal(list(store, (struct store_filter){.finished_from_ms = begun_ms + HOUR_MS + 1}),
                      0);
+    /* the second has not ended: no bound on its end fits it */
+    assert_int_equal(list(store, (struct store_filter){.finished_before_ms = INT64_MAX}), 1);
+    assert_int_equal(list(store, (struct store_filter){.finished_before_ms = 1}), 0);
     assert_int_equal(
         list(store, (struct store_filter){.changed_before_ms = begun_ms + 2 * HOUR_MS}), 1);
     assert_int_equal(list(store, (struct store_filter){.changed_from_ms = begun_ms + 2 * HOUR_MS}),
