@@ -35,8 +35,8 @@
 enum {
     CONNECTION_MEMORY_BYTES = 32 * 1024, /* head of a request, and what the library needs */
     HEAD_BYTES_MAX = 16 * 1024,
-    DISCARD_BYTES_MAX =
-        1024 * 1024, /* a refused body is read to here, so that the client sees why */
+    /* A refused body is read to here, so that the client sees why; far above what routes take. */
+    DISCARD_BYTES_MAX = 32 * 1024 * 1024,
     STREAM_BLOCK_BYTES = 2048,
     TICK_MS = 1000
 };
@@ -441,30 +441,6 @@ static struct MHD_Response *make_body(struct http_response *response)
     return made;
 }
 
-/* Replaces the body by its gzip form where that helps. A failure leaves it plain: still right. */
-static void compress(struct http_exchange *x, struct http_response *response)
-{
-    char *packed = NULL;
-    size_t size = 0;
-    if (!response->compressible) return;
-    http_header_static(response, "Vary", "Accept-Encoding");
-    if (!x->gzip || response->status == 304) return;
-    if (response->packed != NULL) {
-        response->bytes = response->packed;
-        response->size = response->packed_size;
-    } else {
-        if (!gzip_helps(response->size)) return;
-        if (gzip_pack(response->bytes, response->size, &packed, &size) != ISCHIA_OK) return;
-        if (response->release != NULL) response->release(response->owner);
-        response->bytes = packed;
-        response->size = size;
-        response->release = free;
-        response->owner = packed;
-    }
-    http_header_static(response, "Content-Encoding", "gzip");
-    gzip_mark_etag(response->etag, sizeof response->etag);
-}
-
 static bool add_headers(struct MHD_Response *made, const struct http_response *response)
 {
     bool good = true;
@@ -487,7 +463,7 @@ static enum MHD_Result send_response(struct http_exchange *x, struct http_respon
     if (response->action == HTTP_DROP) goto done;
     if (!enter_phase(x->connection, PHASE_ANSWERING, INT64_MAX)) goto done;
     if (atomic_load_explicit(&x->server->stopping, memory_order_relaxed)) response->close = true;
-    if (response->action == HTTP_SEND) compress(x, response);
+    if (response->action == HTTP_SEND) http_response_pack(response, x->gzip);
     made = response->action == HTTP_STREAM ? make_stream(x, response) : make_body(response);
     if (made == NULL) goto done;
     if (add_headers(made, response))
@@ -542,16 +518,10 @@ static int64_t announced_length(const struct http_exchange *x)
     return bytes;
 }
 
-/* Sends the refusal now when there is no body to read first, else keeps it until that was read:
- * closing on a client that still sends would take the answer away from it. */
-static enum MHD_Result refuse_head(struct http_exchange *x, struct http_response *refusal,
-                                   int64_t length)
+/* Keeps the refusal until the body was read: closing on a client that still sends would take the
+ * answer away from it, and in the middle of a body the library takes none. */
+static enum MHD_Result keep_refusal(struct http_exchange *x, struct http_response *refusal)
 {
-    const bool asks_first = http_request_header(&x->request, "Expect") != NULL;
-    if (length == 0 || length > DISCARD_BYTES_MAX || asks_first) {
-        refusal->close = refusal->close || length != 0;
-        return send_response(x, refusal);
-    }
     x->refusal = malloc(sizeof *x->refusal);
     if (x->refusal == NULL) {
         http_response_finish(refusal);
@@ -564,6 +534,17 @@ static enum MHD_Result refuse_head(struct http_exchange *x, struct http_response
             x->refusal->header[i].value = x->refusal->arena + (value - refusal->arena);
     }
     return MHD_YES;
+}
+
+/* Sends the refusal now when there is no body to read first: none was announced, the client asks
+ * before it sends one, or there is too much of it. */
+static enum MHD_Result refuse_head(struct http_exchange *x, struct http_response *refusal,
+                                   int64_t length)
+{
+    const bool asks_first = http_request_header(&x->request, "Expect") != NULL;
+    if (length != 0 && length <= DISCARD_BYTES_MAX && !asks_first) return keep_refusal(x, refusal);
+    refusal->close = refusal->close || length != 0;
+    return send_response(x, refusal);
 }
 
 static enum MHD_Result take_head(struct http_exchange *x, const char *method)
@@ -618,7 +599,7 @@ static enum MHD_Result take_body(struct http_exchange *x, const char *data, size
         struct http_response refusal;
         http_response_init(&refusal, 413);
         x->server->app.on_refuse(x->server->app.context, &x->request, 413, &refusal);
-        return refuse_head(x, &refusal, -1);
+        return keep_refusal(x, &refusal);
     }
     if (!grow_body(x, needed)) return MHD_NO;
     memcpy(x->body + x->request.body_size, data, size);

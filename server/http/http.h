@@ -111,6 +111,9 @@ void http_body(struct http_response *response, const char *type, char *bytes, si
 /* A body in static storage. */
 void http_body_static(struct http_response *response, const char *type, const char *bytes,
                       size_t size);
+/* Replaces the body by its gzip form where the client accepts that and it helps, and says that the
+ * answer depends on it. A failure leaves the body plain: still right. */
+void http_response_pack(struct http_response *response, bool accepted);
 
 struct http_app {
     void *context;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/http/gzip.h"
 #include "server/http/http.h"
 
 /* Responses as plain structs: what handlers fill in before http.c sends it. */
@@ -62,4 +63,27 @@ void http_body_static(struct http_response *response, const char *type, const ch
     response->type = type;
     response->bytes = bytes;
     response->size = size;
+}
+
+void http_response_pack(struct http_response *response, bool accepted)
+{
+    char *packed = NULL;
+    size_t size = 0;
+    if (!response->compressible) return;
+    http_header_static(response, "Vary", "Accept-Encoding");
+    if (!accepted || response->status == 304) return;
+    if (response->packed != NULL) {
+        response->bytes = response->packed;
+        response->size = response->packed_size;
+    } else {
+        if (!gzip_helps(response->size)) return;
+        if (gzip_pack(response->bytes, response->size, &packed, &size) != ISCHIA_OK) return;
+        if (response->release != NULL) response->release(response->owner);
+        response->bytes = packed;
+        response->size = size;
+        response->release = free;
+        response->owner = packed;
+    }
+    http_header_static(response, "Content-Encoding", "gzip");
+    gzip_mark_etag(response->etag, sizeof response->etag);
 }

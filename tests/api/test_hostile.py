@@ -153,12 +153,12 @@ class Hostile(unittest.TestCase):
         )
         sent = 0
         try:
-            while sent < 64 << 20:
+            while sent < 128 << 20:
                 connection.sendall(b'8000\r\n' + b' ' * 0x8000 + b'\r\n')
                 sent += 0x8000
         except OSError:
             pass
-        self.assertLess(sent, 16 << 20)
+        self.assertLess(sent, 64 << 20)
         connection.close()
         self.is_alive()
 

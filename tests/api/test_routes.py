@@ -12,7 +12,7 @@ import time
 import unittest
 import urllib.parse
 
-from service import JSON, SIDE, Service, side
+from service import JSON, SIDE, Answer, Service, direct_only, side
 
 ABSENT = '/v1/assessments/01a201a9-49a6-75d9-8b79-1f36e7bd6914'
 
@@ -135,11 +135,27 @@ class Routes(unittest.TestCase):
             self.problem(answer, 413)
         answer = self.service.ask('POST', '/v1/assessments', b' ' * (64 * 1024 + 1), JSON)
         self.problem(answer, 413)
-        chunks = (b' ' * 8192 for _ in range(10))
-        connection = self.service.connect()
-        connection.request('POST', '/v1/assessments', chunks, JSON, encode_chunked=True)
-        self.assertEqual(connection.getresponse().status, 413)
-        connection.close()
+
+    def test_too_large_a_body_in_chunks_is_413(self):
+        for asks in ({}, {'Expect': '100-continue'}):
+            chunks = (b' ' * 8192 for _ in range(10))
+            connection = self.service.connect()
+            connection.request(
+                'POST', '/v1/assessments', chunks, {**JSON, **asks}, encode_chunked=True
+            )
+            response = connection.getresponse()
+            self.problem(Answer(response, response.read()), 413)
+            connection.close()
+
+    @direct_only('nginx has a limit of its own')
+    def test_who_sends_far_too_much_is_told_so(self):
+        for path, size in (
+            ('/v1/assessments', 2_000_000),
+            ('/v1/assessments', 10_000_000),
+            ('/v1/studies', 1024 * 1024 + 1),
+            ('/v1/studies', 20_000_000),
+        ):
+            self.problem(self.service.ask('POST', path, b' ' * size, JSON), 413)
 
     def test_a_body_of_the_largest_size_is_read(self):
         body = json.dumps(side(F=204.5)).encode().ljust(64 * 1024)
