@@ -188,8 +188,19 @@ static bool value(struct scan *s)
     return true;
 }
 
+/* The last key, cut between characters, for a message; "" when there is none. */
+static const char *last_key(const struct scan *s, char *buffer, size_t size)
+{
+    char key[128]; /* longer than what is shown, so that the cut is text_printable's */
+    const size_t length = s->key_length < sizeof key ? s->key_length : sizeof key - 1;
+    memcpy(key, s->text + s->key, length);
+    key[length] = '\0';
+    return text_printable(key, buffer, size);
+}
+
 static enum ischia_code report(const struct scan *s, struct ischia_error *err)
 {
+    char key[41];
     size_t line = 1, column = 1;
     char found[8] = "the end";
     for (size_t i = 0; i < s->at; i++, column++)
@@ -200,10 +211,9 @@ static enum ischia_code report(const struct scan *s, struct ischia_error *err)
     const int c = peek(s);
     if (c >= 0)
         (void)snprintf(found, sizeof found, c > 0x20 && c < 0x7F ? "'%c'" : "0x%02X", (unsigned)c);
-    const int key_length = s->key_length < 40 ? (int)s->key_length : 40;
-    return FAIL(err, ISCHIA_E_INPUT, "not JSON: line %zu, column %zu%s%.*s: expected %s, found %s",
-                line, column, key_length > 0 ? ", at or after " : "", key_length, s->text + s->key,
-                s->expected, found);
+    return FAIL(err, ISCHIA_E_INPUT, "not JSON: line %zu, column %zu%s%s: expected %s, found %s",
+                line, column, s->key_length > 0 ? ", at or after " : "",
+                last_key(s, key, sizeof key), s->expected, found);
 }
 
 enum ischia_code json_scan(const char *text, size_t length, int depth_max, struct ischia_error *err)

@@ -94,6 +94,16 @@ enum query_answer query_next(const char **at, char *ret_key, size_t key_size, ch
                : QUERY_BAD;
 }
 
+/* As it stands, but with nothing in it that is not text. */
+static void show_key(const struct pair *pair, char *ret, size_t size)
+{
+    char key[128]; /* longer than what is shown, so that the cut is text_printable's */
+    const size_t length = pair->key_length < sizeof key ? pair->key_length : sizeof key - 1;
+    memcpy(key, pair->key, length);
+    key[length] = '\0';
+    (void)text_printable(key, ret, size);
+}
+
 bool query_unknown(const char *query, const char *const *known, char *ret, size_t size)
 {
     struct pair pair;
@@ -101,8 +111,7 @@ bool query_unknown(const char *query, const char *const *known, char *ret, size_
         bool found = false;
         for (int i = 0; known[i] != NULL; i++) found = found || key_is(&pair, known[i]);
         if (found) continue;
-        (void)snprintf(ret, size, "%.*s", (int)(pair.key_length < 60 ? pair.key_length : 60),
-                       pair.key);
+        show_key(&pair, ret, size);
         return true;
     }
     return false;

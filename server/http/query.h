@@ -23,7 +23,7 @@ enum query_answer query_next(const char **at, char *ret_key, size_t key_size, ch
                              size_t value_size);
 
 /* Writes the first parameter that `known` (NULL-ended) does not list and returns true; false when
- * there is none. One that cannot be decoded is written as it stands. */
+ * there is none. It is written as it stands, but as text_printable writes it: always UTF-8. */
 bool query_unknown(const char *query, const char *const *known, char *ret, size_t size);
 
 /* A whole decimal number; false when it is anything else or out of [min, max]. */

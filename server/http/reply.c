@@ -10,12 +10,20 @@
 #include "server/http/query.h"
 #include "server/log.h"
 
-/* The path alone: a query may hold a subject. */
+/* The path alone: a query may hold a subject. A client may send any byte in it; what is no part of
+ * a URI is written as an escape, so that the document is UTF-8 whatever was asked for. */
 static void set_instance(struct problem *problem, const struct http_request *request)
 {
+    enum { ESCAPE_BYTES = 3 };
+    char *to = problem->instance;
+    const char *end = problem->instance + sizeof problem->instance - ESCAPE_BYTES;
     if (request == NULL || problem->instance[0] != '\0') return;
-    (void)snprintf(problem->instance, sizeof problem->instance, "%.*s",
-                   (int)strcspn(request->target, "?"), request->target);
+    for (const char *c = request->target; *c != '\0' && *c != '?' && to < end; c++)
+        if (*c > ' ' && *c < 0x7F)
+            *to++ = *c;
+        else
+            to += snprintf(to, ESCAPE_BYTES + 1, "%%%02X", (unsigned char)*c);
+    *to = '\0';
 }
 
 /* Each protocol has its own form of an error. */

@@ -191,6 +191,30 @@ class Hostile(unittest.TestCase):
             self.assertNotIn(b' 200 ', answer[:20], text)
         self.is_alive()
 
+    def test_a_refusal_is_json_whatever_was_sent(self):
+        torn = b'{"' + b'a' * 36 + '\u00e9\u00e9\u00e9'.encode() + b'": x}'
+        get = b'GET %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n'
+        post = (
+            b'POST %s HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n'
+            b'Connection: close\r\nContent-Length: %d\r\n\r\n%s'
+        )
+        accented = '\u00e9'.encode()
+        for text in (
+            get % b'/v1/\xff',
+            get % (b'/v1/' + accented * 200),
+            get % b'/fhir/\xff',
+            get % b'/v1/assessments?\xff=1',
+            get % (b'/v1/assessments?' + b'k' * 59 + accented * 9 + b'=1'),
+            get % (b'/fhir/RiskAssessment?' + b'k' * 59 + accented * 9 + b'=1'),
+            post % (b'/v1/assessments', len(torn), torn),
+            post % (b'/fhir/$assess', len(torn), torn),
+        ):
+            answer = self.raw(text)
+            head, body = answer.split(b'\r\n\r\n', 1)
+            self.assertRegex(head, rb'^HTTP/1.1 40[04] ')
+            document = json.loads(body.decode())
+            self.assertRegex(document.get('instance', '/v1/'), r'^/v1/[!-~]*$')
+
     def test_two_lengths_do_not_smuggle_a_request(self):
         text = self.raw(
             b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'

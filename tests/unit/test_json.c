@@ -111,6 +111,13 @@ static void messages_say_where(void **state)
     assert_int_equal(parse("{\n  \"muM\": NaN}", 15), ISCHIA_E_INPUT);
     assert_string_equal(err.message, "not JSON: line 2, column 10, at or after \"muM\": expected a "
                                      "value (NaN and Infinity are not JSON), found 'N'");
+    for (int before = 30; before < 40; before++) { /* a cut inside a character, and beside it */
+        char text[64];
+        const int length = snprintf(text, sizeof text, "{\"%.*s\xc3\xa9\xc3\xa9\xc3\xa9\": x}",
+                                    before, "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa");
+        assert_int_equal(parse(text, (size_t)length), ISCHIA_E_INPUT);
+        assert_true(text_is_utf8(err.message, strlen(err.message)));
+    }
 }
 
 static void depth_and_size_are_limited(void **state)

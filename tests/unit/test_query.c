@@ -57,6 +57,10 @@ static void strangers_are_named(void **state)
     assert_false(query_unknown("limit=1&cursor=&&", known, name, sizeof name));
     assert_true(query_unknown("limit=1&limits=2", known, name, sizeof name));
     assert_string_equal(name, "limits");
+    assert_true(query_unknown("\xff=1", known, name, sizeof name));
+    assert_string_equal(name, "?");
+    assert_true(query_unknown("aaaaaaaaaaa\xc3\xa9\xc3\xa9\xc3\xa9=1", known, name, sizeof name));
+    assert_string_equal(name, "aaaaaaaaaaa...");
 }
 
 static void whole_numbers_only(void **state)
