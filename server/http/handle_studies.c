@@ -18,12 +18,6 @@ enum { LIST_USUAL = 50, NAME_BYTES = ISCHIA_SUBJECT_BYTES, WORD_BYTES = 32 };
 
 /* -------------------------------------------------------------------------------- replies */
 
-static void reply_no_study(const struct call *call, struct http_response *ret)
-{
-    reply_refusal_english(call->request, ret, PROBLEM_NOT_FOUND,
-                          "There is no study with this id: it never existed, or it was erased.");
-}
-
 /* The study as it is now; false when ret is the answer already. */
 static bool find_study(struct call *call, struct store_study *ret_study, struct http_response *ret)
 {

@@ -139,6 +139,11 @@ void reply_no_assessment(const struct call *call, struct http_response *ret)
     reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, WORD_DAEMON_REFUSAL_NO_ASSESSMENT, NULL);
 }
 
+void reply_no_study(const struct call *call, struct http_response *ret)
+{
+    reply_refusal(call->request, ret, PROBLEM_NOT_FOUND, WORD_DAEMON_REFUSAL_NO_STUDY, NULL);
+}
+
 void reply_text(const struct http_request *request, struct http_response *ret, int status,
                 const char *type, struct text_out *out)
 {

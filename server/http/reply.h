@@ -30,8 +30,9 @@ reply_refusal_english(const struct http_request *request, struct http_response *
 /* A call that failed for reasons of ours: 500, 503 or 507, logged; the details stay in the log. */
 void reply_failure(const struct http_request *request, struct http_response *ret,
                    const struct ischia_error *err);
-/* 404: no such assessment. */
+/* 404: no such assessment, no such study. */
 void reply_no_assessment(const struct call *call, struct http_response *ret);
+void reply_no_study(const struct call *call, struct http_response *ret);
 
 /* Hands the text over as the body; what failed while it was written is a failure. */
 void reply_text(const struct http_request *request, struct http_response *ret, int status,

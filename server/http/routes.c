@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "api/fhir.h"
 #include "api/problem_doc.h"
@@ -333,6 +334,16 @@ static const char *wanted_type(const struct call *call)
     return "application/fhir+xml"; /* whatever it is, it is not given */
 }
 
+/* Bodies are read as they come: one that is packed would be taken for what it is not. */
+static bool is_sent_plain(struct call *call, struct http_response *ret)
+{
+    const char *encoding = http_request_header(call->request, "Content-Encoding");
+    if (encoding == NULL || strcasecmp(encoding, "identity") == 0) return true;
+    http_header_static(ret, "Accept-Encoding", "identity");
+    reply_refusal(call->request, ret, PROBLEM_MEDIA_TYPE_WRONG, WORD_DAEMON_REFUSAL_ENCODING, NULL);
+    return false;
+}
+
 static bool agree_on_types(struct call *call, struct http_response *ret)
 {
     const struct route *route = call->route;
@@ -344,6 +355,7 @@ static bool agree_on_types(struct call *call, struct http_response *ret)
             WORDS(word_text("type", route->takes[0]), word_text("other", route->takes[1])));
         return false;
     }
+    if (route->takes != NULL && !is_sent_plain(call, ret)) return false;
     if (route->gives == NULL) return true;
     call->accepted = query_accept(wanted_type(call), route->gives);
     if (call->accepted >= 0) return true;
@@ -422,13 +434,16 @@ static bool read_path(struct call *call, struct http_response *ret)
     return true;
 }
 
-/* An {id} that no assessment can have is simply not found. */
+/* An {id} that no assessment or study can have is simply not found. */
 static bool has_usable_id(struct call *call, struct http_response *ret)
 {
     if (strstr(call->route->path, "/v1/") == NULL || strstr(call->route->path, "{id}") == NULL ||
         call->id_text[0] != '\0')
         return true;
-    reply_no_assessment(call, ret);
+    if (strncmp(call->route->path, STUDY, strlen(STUDY)) == 0)
+        reply_no_study(call, ret);
+    else
+        reply_no_assessment(call, ret);
     return false;
 }
 

@@ -124,6 +124,16 @@ class Routes(unittest.TestCase):
         )
         self.problem(self.service.ask('POST', '/v1/assessments', b'x', {}), 415)
 
+    def test_a_packed_body_is_415(self):
+        body = json.dumps(side(F=204.25)).encode()
+        for path in ('/v1/assessments', '/v1/studies', '/v1/estimates', '/fhir/$assess'):
+            packed = {**JSON, 'Content-Encoding': 'gzip'}
+            answer = self.service.ask('POST', path, gzip.compress(body), packed)
+            self.assertEqual(answer.status, 415, path)
+            self.assertEqual(answer.headers['Accept-Encoding'], 'identity')
+        plain = {**JSON, 'Content-Encoding': 'Identity'}
+        self.assertEqual(self.service.ask('POST', '/v1/assessments', body, plain).status, 202)
+
     def test_too_large_a_body_is_413(self):
         for size in (64 * 1024 + 1, 3 * 1024 * 1024):
             answer = self.service.ask(
@@ -241,6 +251,12 @@ class Routes(unittest.TestCase):
         self.problem(self.service.ask('POST', ABSENT + '/cancel'), 404)
         self.problem(self.service.ask('DELETE', ABSENT), 404)
         self.problem(self.service.get('/v1/assessments/not-an-id'), 404)
+        for path in (ABSENT, '/v1/assessments/not-an-id'):
+            self.assertIn('no assessment', self.service.get(path).json()['detail'])
+        for path in (ABSENT.replace('assessments', 'studies'), '/v1/studies/not-an-id'):
+            for below in ('', '/results'):
+                answer = self.service.get(path + below)
+                self.assertIn('no study', self.problem(answer, 404)['detail'])
         self.problem(self.service.get('/nothing'), 404)
         self.problem(self.service.get('/assets/../index.html'), 404)
 
