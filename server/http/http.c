@@ -17,6 +17,7 @@
 
 #include "server/http/gzip.h"
 #include "server/http/listen.h"
+#include "server/http/query.h"
 #include "server/http/tls.h"
 
 /*
@@ -66,7 +67,8 @@ struct http_exchange {
     size_t body_capacity, body_max, discarded;
     struct http_response *refusal; /* to be sent when the body was read and thrown away */
     struct http_stream stream;
-    bool gzip; /* the client takes it */
+    bool gzip;       /* the client takes it */
+    char *authority; /* of a target in absolute form, behind target; NULL: none */
     /* Under server->lock: */
     bool suspended, wake_pending;
     int64_t wake_at_ms;
@@ -108,7 +110,9 @@ int64_t http_now_ms(void)
 
 const char *http_request_header(const struct http_request *request, const char *name)
 {
-    return MHD_lookup_connection_value(request->exchange->mhd, MHD_HEADER_KIND, name);
+    const struct http_exchange *x = request->exchange;
+    if (x->authority != NULL && strcasecmp(name, "Host") == 0) return x->authority;
+    return MHD_lookup_connection_value(x->mhd, MHD_HEADER_KIND, name);
 }
 
 struct header_count {
@@ -353,23 +357,35 @@ static void on_connection(void *context, struct MHD_Connection *mhd, void **sock
 
 /* -------------------------------------------------------------------------- requests */
 
+enum { TARGET_MORE_BYTES = 3 }; /* what set_target may need beyond the uri: "/", and two ends */
+
+/* One in absolute form is taken apart: the path ("/" if none), and behind it the authority. */
+static void set_target(struct http_exchange *x, const char *uri)
+{
+    const char *authority = NULL;
+    size_t length = 0;
+    const char *path = query_absolute(uri, &authority, &length);
+    const char *root = path != NULL && path[0] != '/' ? "/" : "";
+    char *end = stpcpy(stpcpy(x->target, root), path == NULL ? uri : path);
+    if (path != NULL) x->authority = memcpy(end + 1, authority, length); /* of zeros, so it ends */
+    x->request.target = x->target;
+    x->request.query = strchr(x->target, '?');
+    x->request.query = x->request.query == NULL ? "" : x->request.query + 1;
+}
+
 static void *on_uri(void *context, const char *uri, struct MHD_Connection *mhd)
 {
     struct http_server *server = context;
     struct connection *connection =
         MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context;
-    const size_t length = strlen(uri);
     if (connection == NULL) return NULL;
-    struct http_exchange *x = calloc(1, sizeof *x + length + 1);
+    struct http_exchange *x = calloc(1, sizeof *x + strlen(uri) + TARGET_MORE_BYTES);
     if (x == NULL) return NULL;
-    memcpy(x->target, uri, length + 1);
-    const char *question = strchr(x->target, '?');
+    set_target(x, uri);
     atomic_store_explicit(&x->references, 1, memory_order_relaxed);
     x->server = server;
     x->connection = connection;
     x->mhd = mhd;
-    x->request.target = x->target;
-    x->request.query = question == NULL ? "" : question + 1;
     x->request.body = "";
     x->request.tls = connection->tls;
     x->request.begun_ms = http_now_ms();
@@ -480,6 +496,7 @@ static enum MHD_Result refuse(struct http_exchange *x, int status)
     struct http_response response;
     http_response_init(&response, status);
     x->server->app.on_refuse(x->server->app.context, &x->request, status, &response);
+    response.close = response.close || status == 400; /* where the request ends is not sure */
     return send_response(x, &response);
 }
 
@@ -490,18 +507,14 @@ static enum http_method method_of(const char *name)
     return HTTP_OTHER;
 }
 
-struct head_size {
-    size_t bytes;
-};
-
 static enum MHD_Result add_size(void *context, enum MHD_ValueKind kind, const char *key,
                                 size_t key_size, const char *value, size_t value_size)
 {
-    struct head_size *head = context;
+    size_t *head_bytes = context;
     (void)kind;
     (void)key;
     (void)value;
-    head->bytes += key_size + value_size + 4;
+    *head_bytes += key_size + value_size + 4;
     return MHD_YES;
 }
 
@@ -547,19 +560,27 @@ static enum MHD_Result refuse_head(struct http_exchange *x, struct http_response
     return send_response(x, refusal);
 }
 
+/* Which Host is asked for, or where the body ends, may not depend on who reads the head. */
+static bool is_ambiguous(const struct http_exchange *x)
+{
+    return http_request_header_count(&x->request, "Host") > 1 ||
+           http_request_header_count(&x->request, "Content-Length") > 1;
+}
+
 static enum MHD_Result take_head(struct http_exchange *x, const char *method)
 {
     const struct http_app *app = &x->server->app;
     struct http_response refusal;
-    struct head_size head = {strlen(x->target)};
+    size_t head_bytes = strlen(x->target);
     const int64_t length = announced_length(x);
     const char *encodings = http_request_header(&x->request, "Accept-Encoding");
-    (void)MHD_get_connection_values_n(x->mhd, MHD_HEADER_KIND, add_size, &head);
+    (void)MHD_get_connection_values_n(x->mhd, MHD_HEADER_KIND, add_size, &head_bytes);
     x->step = STEP_BODY;
     x->request.method = method_of(method);
     x->request.has_body = length != 0;
     x->gzip = encodings != NULL && gzip_accepted(encodings);
-    if (head.bytes > HEAD_BYTES_MAX) return refuse(x, 431);
+    if (head_bytes > HEAD_BYTES_MAX) return refuse(x, 431);
+    if (is_ambiguous(x)) return refuse(x, 400);
     http_response_init(&refusal, 500);
     if (!app->on_head(app->context, &x->request, &x->body_max, &refusal))
         return refuse_head(x, &refusal, length);

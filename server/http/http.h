@@ -37,7 +37,7 @@ struct http_exchange; /* one request and its answer, as http.c sees it */
 
 struct http_request {
     enum http_method method;
-    const char *target; /* path and query as sent                                     */
+    const char *target; /* path and query as sent, without the authority of an absolute one */
     const char *query;  /* behind the '?', "" when there is none                      */
     const char *body;   /* "" until it is there; not NUL-terminated                   */
     size_t body_size;
@@ -51,7 +51,8 @@ struct http_request {
     struct http_exchange *exchange;
 };
 
-/* The first value of a header, NULL when it was not sent. Valid as long as the request. */
+/* The first value of a header, NULL when it was not sent. Valid as long as the request. "Host" is
+ * the authority of a target in absolute form, which replaces the header (RFC 9112, 3.2.2). */
 const char *http_request_header(const struct http_request *request, const char *name);
 /* How often a header was sent. */
 int http_request_header_count(const struct http_request *request, const char *name);
@@ -123,8 +124,8 @@ struct http_app {
                     struct http_response *ret_refusal);
     /* All is read, or a wait ended. ret is initialised with status 200. */
     void (*on_request)(void *context, struct http_request *request, struct http_response *ret);
-    /* The transport refuses (408, 413, 431): the application words it. request is NULL when there
-     * is none to speak of; the answer may then have no headers of its own. */
+    /* The transport refuses (400, 408, 413, 431): the application words it. request is NULL when
+     * there is none to speak of; the answer may then have no headers of its own. */
     void (*on_refuse)(void *context, struct http_request *request, int status,
                       struct http_response *ret);
     /* The last call for a request; status 0 when no answer was sent. */

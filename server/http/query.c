@@ -39,6 +39,19 @@ bool query_decode(const char *text, size_t length, bool plus, char *ret, size_t 
     return text_is_utf8(ret, used);
 }
 
+const char *query_absolute(const char *target, const char **ret, size_t *ret_length)
+{
+    static const char *const schemes[] = {"http://", "https://"};
+    for (size_t i = 0; i < sizeof schemes / sizeof schemes[0]; i++) {
+        const size_t length = strlen(schemes[i]);
+        if (strncasecmp(target, schemes[i], length) != 0) continue;
+        *ret = target + length;
+        *ret_length = strcspn(*ret, "/?");
+        return *ret + *ret_length;
+    }
+    return NULL;
+}
+
 /* One "key=value" of a query string; `at` moves behind it. False at the end. */
 struct pair {
     const char *key, *value;

@@ -11,6 +11,11 @@
  * result holds a control character or is not UTF-8, or does not fit. plus: '+' means a blank. */
 bool query_decode(const char *text, size_t length, bool plus, char *ret, size_t size);
 
+/* Splits a target in absolute form, "http://name:port/path?query", as proxies send it. Returns what
+ * stands behind the authority, and the authority itself: ret of *ret_length bytes. NULL when the
+ * target has another form. */
+const char *query_absolute(const char *target, const char **ret, size_t *ret_length);
+
 enum query_answer { QUERY_ABSENT, QUERY_FOUND, QUERY_BAD };
 
 /* The value of a query string's parameter. BAD: it is there twice, or cannot be decoded or does

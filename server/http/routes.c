@@ -501,6 +501,7 @@ static void on_refuse(void *context, struct http_request *request, int status,
         enum problem_kind kind;
         enum word detail;
     } refusals[] = {
+        {400, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_HEAD_TWICE},
         {408, PROBLEM_TIMEOUT, WORD_DAEMON_REFUSAL_LATE},
         {413, PROBLEM_TOO_LARGE, WORD_DAEMON_REFUSAL_BODY},
         {431, PROBLEM_HEADERS_TOO_LARGE, WORD_DAEMON_REFUSAL_HEAD},

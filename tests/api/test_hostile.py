@@ -224,6 +224,47 @@ class Hostile(unittest.TestCase):
         )
         self.assertNotIn(b'alive', text)
 
+    @direct_only('nginx judges heads by itself')
+    def test_a_head_that_reads_two_ways_is_400(self):
+        good = json.dumps(side(F=131.5)).encode()
+        for head in (
+            b'GET /healthz HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n',
+            b'GET /healthz HTTP/1.1\r\nHost: localhost\r\nhost: evil.example\r\n\r\n',
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\n'
+            b'Content-Length: 0\r\nContent-Length: %d\r\n\r\n' % len(good) + good,
+            b'POST /v1/assessments HTTP/1.1\r\nHost: localhost\r\n'
+            b'Content-Type: application/json\r\n'
+            b'Content-Length: %d\r\nContent-Length: 4\r\n\r\n' % len(good) + good,
+        ):
+            # Its end closes the connection: nothing behind it is taken for a request.
+            text = self.raw(head + b'GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n')
+            self.assertTrue(text.startswith(b'HTTP/1.1 400 '), text[:200])
+            self.assertEqual(text.count(b'HTTP/1.1 '), 1, text)
+            self.assertEqual(json.loads(text.split(b'\r\n\r\n', 1)[1])['status'], 400)
+        self.assertNotIn('131.5', self.service.get('/v1/assessments').body.decode())
+
+    @direct_only('nginx passes the path alone')
+    def test_a_target_with_its_authority(self):
+        own = self.service.address.encode()
+        for target, host, status in (
+            (b'http://%s/healthz' % own, own, 200),
+            (b'HTTP://localhost/healthz', own, 200),
+            (b'http://%s/healthz' % own, b'evil.example', 200),  # Host is what the target says
+            (b'http://%s' % own, own, 200),
+            (b'http://%s?lang=de' % own, own, 200),
+            (b'http://%s/v1/parameters?lang=xx' % own, own, 400),
+            (b'http://%s/nothing' % own, own, 404),
+            (b'http://evil.example/healthz', own, 403),
+            (b'http:///healthz', own, 403),
+            (b'http://user@%s/healthz' % own, own, 403),
+            (b'ftp://%s/healthz' % own, own, 404),
+        ):
+            text = self.raw(
+                b'GET %s HTTP/1.1\r\nHost: %s\r\nConnection: close\r\n\r\n' % (target, host)
+            )
+            self.assertTrue(text.startswith(b'HTTP/1.1 %d ' % status), (target, text[:300]))
+
     def test_pipelined_requests_are_answered_in_order(self):
         text = self.raw(
             b'GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n' * 5

@@ -23,6 +23,10 @@ static void read_headers(const char *text)
     (void)query_etag_matches(text, "\"tag\"");
     (void)query_list_has(text, "word");
     (void)listen_text_is_loopback(text);
+    const char *authority = text, *rest;
+    size_t length = 0;
+    if ((rest = query_absolute(text, &authority, &length)) != NULL)
+        MUST(authority + length == rest && rest <= text + strlen(text));
     if (query_host(text, word, sizeof word)) MUST(strpbrk(word, "@/ ") == NULL && word[0] != '\0');
     if (query_forwarded_for(text, word, sizeof word)) MUST(strchr(word, ',') == NULL);
 }

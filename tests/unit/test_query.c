@@ -160,6 +160,36 @@ static void hosts_are_whole_names(void **state)
     assert_false(query_list_has("", ""));
 }
 
+static void targets_in_absolute_form_are_taken_apart(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *target, *authority, *rest;
+    } cases[] = {
+        {"http://a.example:80/v1?x=http://b/", "a.example:80", "/v1?x=http://b/"},
+        {"HTTPS://[::1]:8443/", "[::1]:8443", "/"},
+        {"http://a?x", "a", "?x"},
+        {"http://a", "a", ""},
+        {"http:///v1", "", "/v1"},
+        {"/http://a/", NULL, NULL},
+        {"ftp://a/", NULL, NULL},
+        {"*", NULL, NULL},
+        {"", NULL, NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const char *authority = NULL;
+        size_t length = 0;
+        const char *rest = query_absolute(cases[i].target, &authority, &length);
+        if (cases[i].rest == NULL) {
+            assert_null(rest);
+            continue;
+        }
+        assert_string_equal(rest, cases[i].rest);
+        assert_int_equal(length, strlen(cases[i].authority));
+        assert_memory_equal(authority, cases[i].authority, length);
+    }
+}
+
 static void only_whole_addresses_are_loopback(void **state)
 {
     (void)state;
@@ -195,6 +225,7 @@ int main(void)
         cmocka_unit_test(accept_chooses),
         cmocka_unit_test(tags_match_weakly),
         cmocka_unit_test(hosts_are_whole_names),
+        cmocka_unit_test(targets_in_absolute_form_are_taken_apart),
         cmocka_unit_test(only_whole_addresses_are_loopback),
         cmocka_unit_test(the_last_forwarded_address_counts),
     };
