@@ -290,11 +290,12 @@ void page_asset(struct call *call, const struct asset *asset, struct http_respon
     }
     http_header_static(ret, "Cache-Control", "no-cache");
     (void)snprintf(ret->etag, sizeof ret->etag, "%s", asset->etag);
-    if (reply_not_modified(call->request, ret)) return;
+    const bool is_known = reply_not_modified(call->request, ret);
+    ret->compressible = asset->gzip != NULL;
+    if (is_known) return;
     http_body_static(ret, asset->type, asset->bytes, asset->size);
     ret->packed = asset->gzip;
     ret->packed_size = asset->gzip_size;
-    ret->compressible = asset->gzip != NULL;
 }
 
 void handle_asset(struct call *call, struct http_response *ret)

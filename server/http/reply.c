@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "api/fhir.h"
+#include "server/http/gzip.h"
 #include "server/http/query.h"
 #include "server/log.h"
 
@@ -158,10 +159,25 @@ void reply_text(const struct http_request *request, struct http_response *ret, i
     http_body(ret, type, text, length);
 }
 
+/* The packed form of a body has a tag of its own: the 304 names the one that the client has. Where
+ * it has both, the one that it would be sent. */
+static void name_known_form(const struct http_request *request, const char *known, char *etag)
+{
+    char packed[HTTP_ETAG_BYTES];
+    const char *encodings = http_request_header(request, "Accept-Encoding");
+    const bool accepted = encodings != NULL && gzip_accepted(encodings);
+    memcpy(packed, etag, sizeof packed);
+    gzip_mark_etag(packed, sizeof packed);
+    if (strstr(known, packed) != NULL && (accepted || strstr(known, etag) == NULL))
+        memcpy(etag, packed, sizeof packed);
+}
+
 bool reply_not_modified(const struct http_request *request, struct http_response *ret)
 {
     const char *known = http_request_header(request, "If-None-Match");
     if (known == NULL || !query_etag_matches(known, ret->etag)) return false;
     ret->status = 304;
+    ret->compressible = true; /* as the body would be: it says so in Vary */
+    name_known_form(request, known, ret->etag);
     return true;
 }

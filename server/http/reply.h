@@ -38,7 +38,8 @@ void reply_no_study(const struct call *call, struct http_response *ret);
 void reply_text(const struct http_request *request, struct http_response *ret, int status,
                 const char *type, struct text_out *out);
 
-/* True, with ret made a 304, when the client has this representation already. Sets the ETag. */
+/* True, with ret made a 304, when the client has this representation already, packed or not; ret's
+ * ETag is then that of the form it has. */
 bool reply_not_modified(const struct http_request *request, struct http_response *ret);
 
 #endif

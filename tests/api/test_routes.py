@@ -274,7 +274,8 @@ class Routes(unittest.TestCase):
             self.assertEqual(first.status, 200, where)
             again = self.service.get(where, If_None_Match=first.headers['ETag'])
             self.assertEqual((again.status, again.body), (304, b''), where)
-            self.assertEqual(again.headers['ETag'], first.headers['ETag'])
+            for name in ('ETag', 'Vary', 'Cache-Control', 'Content-Language'):
+                self.assertEqual(again.headers.get_all(name), first.headers.get_all(name), name)
             other = self.service.get(where, If_None_Match='"other", W/"another"')
             self.assertEqual(other.status, 200)
 
@@ -287,8 +288,17 @@ class Routes(unittest.TestCase):
             self.assertEqual(gzip.decompress(packed.body), plain.body)
             self.assertEqual(packed.headers['Vary'], 'Accept-Encoding')
             self.assertNotEqual(packed.headers['ETag'], plain.headers['ETag'])
-            again = self.service.get(where, If_None_Match=packed.headers['ETag'])
-            self.assertEqual(again.status, 304)
+            plain_tag, packed_tag = plain.headers['ETag'], packed.headers['ETag']
+            for known, accepted, told in (
+                (packed_tag, 'gzip', packed_tag),
+                (packed_tag, '', packed_tag),
+                (plain_tag, 'gzip', plain_tag),
+                (f'{plain_tag}, {packed_tag}', 'gzip', packed_tag),
+                (f'{plain_tag}, {packed_tag}', '', plain_tag),
+            ):
+                again = self.service.get(where, If_None_Match=known, Accept_Encoding=accepted)
+                self.assertEqual((again.status, again.headers['ETag']), (304, told), known)
+                self.assertEqual(again.headers['Vary'], 'Accept-Encoding')
             refused = self.service.get(where, Accept_Encoding='gzip;q=0')
             self.assertIsNone(refused.headers['Content-Encoding'])
 
