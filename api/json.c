@@ -88,16 +88,29 @@ static void check_tree(const cJSON *item, const char *pointer, int members_max,
     if (cJSON_IsArray(item)) check_array(item, pointer, members_max, faults);
 }
 
+/* What a tree does not show: cJSON ends a string at its first NUL. */
+static void check_seen(const struct json_scan_seen *seen, int depth_max, struct doc_faults *faults)
+{
+    if (seen->depth > depth_max)
+        doc_faults_add(faults, "", "too_many", "the document is nested more than %d deep",
+                       depth_max);
+    if (seen->nul)
+        doc_faults_add(faults, "", "malformed", "a text%s%s holds \\u0000, which is not accepted",
+                       seen->key[0] != '\0' ? " at or after " : "", seen->key);
+}
+
 enum ischia_code json_parse(struct json **ret, const char *text, size_t length,
                             const struct json_limits *limits, struct doc_faults *faults,
                             struct ischia_error *err)
 {
-    assert(limits->depth_max > 0 && limits->depth_max <= 64);
+    struct json_scan_seen seen;
+    assert(limits->depth_max > 0 && limits->depth_max <= JSON_SCAN_DEPTH_MAX);
     CHECK(length <= limits->bytes_max, err, ISCHIA_E_LIMIT,
           "the document is larger than the accepted %zu KiB", limits->bytes_max / 1024);
-    TRY(json_scan(text, length, limits->depth_max, err));
+    TRY(json_scan(text, length, limits->depth_max, &seen, err));
     cJSON *root = cJSON_ParseWithLength(text, length);
     CHECK(root != NULL, err, ISCHIA_E_MEMORY, "out of memory while reading a JSON document");
+    check_seen(&seen, limits->depth_max, faults);
     check_tree(root, "", limits->members_max, faults);
     *ret = (struct json *)(void *)root;
     return ISCHIA_OK;

@@ -42,12 +42,13 @@ extern const struct json_limits json_limits_stored; /* 16 MiB, 16, 256: what we 
 /*
  * Parses exactly one JSON value, white space around it allowed. *ret is the caller's: json_destroy.
  *
- * ISCHIA_E_INPUT: not JSON (bad syntax, NaN, trailing bytes, invalid UTF-8, a NUL inside a string,
- * a lone surrogate, nested too deep, empty); the message gives line and column. ISCHIA_E_LIMIT:
+ * ISCHIA_E_INPUT: not JSON (bad syntax, NaN, trailing bytes, invalid UTF-8, a raw NUL, a lone
+ * surrogate, empty) or nested more than 64 deep; the message gives line and column. ISCHIA_E_LIMIT:
  * more than bytes_max. ISCHIA_E_MEMORY. On error *ret is untouched.
  * ISCHIA_OK with something added to *faults: it is JSON but has duplicate keys ("duplicate"), too
- * many members, or a number beyond the range of a double ("not_finite"); *ret is set all the same
- * so that the reader can find the other faults too.
+ * many members or levels ("too_many"), "\u0000" in a string, which ends there ("malformed"), or a
+ * number beyond the range of a double ("not_finite"); *ret is set all the same so that the reader
+ * can find the other faults too.
  */
 ISCHIA_MUST_CHECK enum ischia_code json_parse(struct json **ret, const char *text, size_t length,
                                               const struct json_limits *limits,

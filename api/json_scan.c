@@ -16,7 +16,7 @@ struct scan {
     size_t length;
     size_t at;
     int depth;
-    int depth_max;
+    struct json_scan_seen seen;
     size_t key, key_length; /* the last key of an object, with its quotes; length 0: none  */
     const char *expected;   /* what the scan wanted to see at `at`, once it has failed     */
 };
@@ -66,13 +66,29 @@ static bool four_hex_digits(struct scan *s, unsigned *ret)
     return true;
 }
 
+/* The last key, cut between characters, for a message; "" when there is none. */
+static const char *last_key(const struct scan *s, char *buffer, size_t size)
+{
+    char key[128]; /* longer than what is shown, so that the cut is text_printable's */
+    const size_t length = s->key_length < sizeof key ? s->key_length : sizeof key - 1;
+    memcpy(key, s->text + s->key, length);
+    key[length] = '\0';
+    return text_printable(key, buffer, size);
+}
+
+static void note_nul(struct scan *s)
+{
+    if (!s->seen.nul) (void)last_key(s, s->seen.key, sizeof s->seen.key);
+    s->seen.nul = true;
+}
+
 /* Behind "\u": a character, or a pair of surrogates that makes one. */
 static bool unicode_escape(struct scan *s)
 {
     static const char pair[] = "a surrogate pair (\\uD800-\\uDBFF followed by \\uDC00-\\uDFFF)";
     unsigned unit;
     if (!four_hex_digits(s, &unit)) return false;
-    if (unit == 0) return wanted(s, "a character other than \\u0000");
+    if (unit == 0) note_nul(s);
     if (unit < 0xD800 || unit > 0xDFFF) return true;
     if (unit >= 0xDC00 || !take(s, '\\') || !take(s, 'u')) return wanted(s, pair);
     if (!four_hex_digits(s, &unit)) return false;
@@ -146,7 +162,8 @@ static bool member(struct scan *s)
 static bool container(struct scan *s, char close, bool (*item)(struct scan *s))
 {
     s->at++;
-    if (++s->depth > s->depth_max) return wanted(s, "less nesting");
+    if (++s->depth > JSON_SCAN_DEPTH_MAX) return wanted(s, "less nesting");
+    if (s->depth > s->seen.depth) s->seen.depth = s->depth;
     skip_space(s);
     if (!take(s, close)) {
         do {
@@ -188,16 +205,6 @@ static bool value(struct scan *s)
     return true;
 }
 
-/* The last key, cut between characters, for a message; "" when there is none. */
-static const char *last_key(const struct scan *s, char *buffer, size_t size)
-{
-    char key[128]; /* longer than what is shown, so that the cut is text_printable's */
-    const size_t length = s->key_length < sizeof key ? s->key_length : sizeof key - 1;
-    memcpy(key, s->text + s->key, length);
-    key[length] = '\0';
-    return text_printable(key, buffer, size);
-}
-
 static enum ischia_code report(const struct scan *s, struct ischia_error *err)
 {
     char key[41];
@@ -216,18 +223,20 @@ static enum ischia_code report(const struct scan *s, struct ischia_error *err)
                 last_key(s, key, sizeof key), s->expected, found);
 }
 
-enum ischia_code json_scan(const char *text, size_t length, int depth_max, struct ischia_error *err)
+enum ischia_code json_scan(const char *text, size_t length, int depth_max,
+                           struct json_scan_seen *ret, struct ischia_error *err)
 {
-    struct scan s = {.text = text, .length = length, .depth_max = depth_max};
+    struct scan s = {.text = text, .length = length};
     skip_space(&s);
     CHECK(s.at < length, err, ISCHIA_E_INPUT, "not JSON: the document is empty");
     CHECK(length < 3 || memcmp(text, "\xEF\xBB\xBF", 3) != 0, err, ISCHIA_E_INPUT,
           "not JSON: the document starts with a byte order mark; save it as plain UTF-8");
     if (value(&s)) {
+        *ret = s.seen;
         if (s.at == length) return ISCHIA_OK;
         s.expected = "nothing more after the value";
     }
-    if (s.depth > depth_max)
+    if (s.depth > JSON_SCAN_DEPTH_MAX)
         return FAIL(err, ISCHIA_E_INPUT, "not accepted: nested more than %d deep", depth_max);
     return report(&s, err);
 }

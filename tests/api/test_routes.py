@@ -111,6 +111,15 @@ class Routes(unittest.TestCase):
             },
         )
 
+    def test_json_that_is_more_than_is_taken_is_422(self):
+        deep = json.dumps(SIDE)[:-1] + ', "label": ' + '[' * 16 + ']' * 16 + '}'
+        nul = json.dumps(side(label='a\0b'))
+        for path in ('/v1/assessments', '/v1/studies'):
+            for body, code in ((deep, 'too_many'), (nul, 'malformed')):
+                answer = self.service.ask('POST', path, body.encode(), JSON)
+                self.assertIn(('', code), self.errors(answer))
+        self.problem(self.service.ask('POST', '/v1/assessments', deep[:-1].encode(), JSON), 400)
+
     def test_a_duplicate_key_is_refused(self):
         body = json.dumps(SIDE)[:-1] + ', "F": 200}'
         self.assertIn(

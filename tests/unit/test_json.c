@@ -75,7 +75,6 @@ static void what_is_not_json_is_refused(void **state)
         "]",
         "\"\\x\"",
         "\"\\u12\"",
-        "\"\\u0000\"",
         "\"\\ud800\"",
         "\"\\ud800\\u0041\"",
         "\"\\udc00\"",
@@ -126,9 +125,19 @@ static void depth_and_size_are_limited(void **state)
     (void)state;
     memset(brackets, '[', 17);
     memset(brackets + 17, ']', 17);
-    assert_int_equal(parse(brackets, 34), ISCHIA_E_INPUT);
-    assert_non_null(strstr(err.message, "16 deep"));
+    assert_int_equal(parse(brackets, 34), ISCHIA_OK);
+    json_destroy(root);
+    assert_int_equal(faults.count, 1);
+    assert_string_equal(faults.item[0].code, "too_many");
+    assert_non_null(strstr(faults.item[0].detail, "16 deep"));
     assert_int_equal(parse(brackets + 1, 32), ISCHIA_OK);
+    json_destroy(root);
+    assert_int_equal(faults.count, 0);
+    memset(brackets, '[', 65);
+    memset(brackets + 65, ']', 65);
+    assert_int_equal(parse(brackets, 130), ISCHIA_E_INPUT);
+    assert_non_null(strstr(err.message, "16 deep"));
+    assert_int_equal(parse(brackets + 1, 128), ISCHIA_OK);
     json_destroy(root);
     memset(brackets, '[', sizeof brackets);
     assert_int_equal(parse(brackets, sizeof brackets), ISCHIA_E_LIMIT);
@@ -137,6 +146,23 @@ static void depth_and_size_are_limited(void **state)
     brackets[0] = '1';
     assert_int_equal(parse(brackets, sizeof brackets - 1), ISCHIA_OK);
     json_destroy(root);
+}
+
+static void an_escaped_nul_is_a_fault(void **state)
+{
+    static const char text[] = "{\"label\":\"a\\u0000b\",\"x\":[\"\\u0000\",1,1]}";
+    (void)state;
+    assert_int_equal(parse(text, strlen(text)), ISCHIA_OK);
+    assert_int_equal(faults.count, 1);
+    assert_string_equal(faults.item[0].code, "malformed");
+    assert_string_equal(faults.item[0].detail,
+                        "a text at or after \"label\" holds \\u0000, which is not accepted");
+    assert_int_equal(json_count(json_member(root, "x")), 3);
+    json_destroy(root);
+    assert_int_equal(parse("\"\\u0000\"", 8), ISCHIA_OK);
+    assert_int_equal(faults.count, 1);
+    json_destroy(root);
+    assert_int_equal(parse("{\"a\":\"\\u0000\"} x", 16), ISCHIA_E_INPUT);
 }
 
 static void duplicates_are_faults(void **state)
@@ -263,6 +289,7 @@ int main(void)
         cmocka_unit_test(what_is_not_json_is_refused),
         cmocka_unit_test(messages_say_where),
         cmocka_unit_test(depth_and_size_are_limited),
+        cmocka_unit_test(an_escaped_nul_is_a_fault),
         cmocka_unit_test(duplicates_are_faults),
         cmocka_unit_test(a_number_beyond_a_double_is_a_fault),
         cmocka_unit_test(too_many_members_are_a_fault),
