@@ -45,6 +45,15 @@ class Docs(unittest.TestCase):
         }
         self.assertEqual(routes, {route_of(line) for line in curl_lines()})
 
+    def test_what_needs_no_token_is_listed(self):
+        listed = subprocess.run(
+            [PROGRAM, '--print-routes'], capture_output=True, text=True, check=True
+        )
+        routes = [line.split() for line in listed.stdout.splitlines()]
+        free = {words[1].removesuffix('{file}') for words in routes if words[-1] == 'open'}
+        access = read('docs/API.md').split('\n## Access\n')[1].split('\n| scope')[0]
+        self.assertEqual(set(re.findall('`(/[^`]*)`', access)), free)
+
     def study(self, service):
         design = {
             'name': 'docs',
