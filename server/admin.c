@@ -18,6 +18,8 @@ const char admin_help[] =
     "      token on every request needs one.\n"
     "  token list            Shows the tokens, without their secrets.\n"
     "  token revoke ID       Makes a token invalid within a second.\n"
+    "  token forget          Erases the tokens that are revoked or expired. When none is left, a\n"
+    "      service on the loopback address asks for none any more.\n"
     "  audit verify          Checks the chain of the audit log and prints its head.\n"
     "  audit list            Prints the audit log.\n"
     "  feedback list         Prints what clinicians answered to CDS cards, a JSON object a line.\n"
@@ -132,6 +134,17 @@ static enum ischia_code token_revoke(struct store *store, char *const *words, in
     return auth_token_revoke(store, words[0], err);
 }
 
+static enum ischia_code token_forget(struct store *store, char *const *words, int count,
+                                     struct ischia_error *err)
+{
+    int64_t forgotten = 0;
+    (void)words;
+    (void)count;
+    TRY(auth_token_forget(store, &forgotten, err));
+    (void)printf("%lld\n", (long long)forgotten);
+    return ISCHIA_OK;
+}
+
 /* --------------------------------------------------------------------------- audit */
 
 static enum ischia_code verify(struct store *store, char *const *words, int count,
@@ -221,6 +234,7 @@ static const struct command commands[] = {
     {"token", "create", 0, 3, token_create, "token.create"},
     {"token", "list", 0, 0, token_list, NULL},
     {"token", "revoke", 1, 1, token_revoke, "token.revoke"},
+    {"token", "forget", 0, 0, token_forget, "token.forget"},
     {"audit", "verify", 0, 0, verify, NULL},
     {"audit", "list", 0, 0, list, NULL},
     {"feedback", "list", 0, 0, feedback_list, NULL},

@@ -10,6 +10,8 @@
 #include <strings.h>
 #include <time.h>
 
+#include "server/log.h"
+
 enum {
     SECRET_BYTES = 32,
     SECRET_TEXT_BYTES = 44, /* base64url without padding, and its NUL */
@@ -19,9 +21,12 @@ static const char token_prefix[] = AUTH_TOKEN_PREFIX;
 static const char hash_key[] = "ischia access token v1"; /* separates this use of BLAKE2b */
 
 struct token_list {
-    struct store_token *token;
+    struct store_token *token; /* none that is revoked */
     size_t count;
-    bool failed; /* no memory for one */
+    int64_t now_ms; /* when it was read */
+    bool in_use;    /* there was a token ever, revoked or not, that is not forgotten */
+    bool failed;    /* no memory for one */
+    size_t refused; /* of those that hold, above AUTH_TOKENS_MAX */
 };
 
 struct auth {
@@ -30,6 +35,8 @@ struct auth {
     struct token_list list;
     int64_t epoch;
     atomic_llong checked_s;
+    bool required;
+    atomic_bool failing; /* the tokens cannot be read: said once */
 };
 
 static const struct {
@@ -69,29 +76,56 @@ static void hash_secret(unsigned char ret[HASH_BYTES], const char *secret)
                              (const unsigned char *)hash_key, sizeof hash_key - 1);
 }
 
+static int64_t unix_ms(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+static bool is_expired(const struct store_token *token, int64_t now_ms)
+{
+    return token->expires_ms != 0 && now_ms >= token->expires_ms;
+}
+
+/* Where one more goes; NULL: no memory, which list->failed says, or every place is taken. An
+ * expired one, which is kept only so that its owner is told why it no longer works, makes room. */
+static struct store_token *find_place(struct token_list *list)
+{
+    if (list->count == AUTH_TOKENS_MAX) {
+        for (size_t i = 0; i < list->count; i++)
+            if (is_expired(&list->token[i], list->now_ms)) return &list->token[i];
+        return NULL;
+    }
+    struct store_token *grown = realloc(list->token, (list->count + 1) * sizeof *grown);
+    list->failed = grown == NULL;
+    if (list->failed) return NULL;
+    list->token = grown;
+    return &grown[list->count++];
+}
+
 static bool keep_token(void *context, const struct store_token *token)
 {
     struct token_list *list = context;
-    if (token->revoked_ms != 0) return true;
-    struct store_token *grown = list->count < AUTH_TOKENS_MAX
-                                    ? realloc(list->token, (list->count + 1) * sizeof *grown)
-                                    : NULL;
-    if (grown == NULL) {
-        list->failed = true;
-        return false;
-    }
-    grown[list->count++] = *token;
-    list->token = grown;
-    return true;
+    const bool expired = is_expired(token, list->now_ms);
+    list->in_use = true;
+    if (token->revoked_ms != 0 || (expired && list->count == AUTH_TOKENS_MAX)) return true;
+    struct store_token *place = find_place(list);
+    if (place != NULL) *place = *token;
+    list->refused += place == NULL && !list->failed;
+    return !list->failed;
 }
 
 static enum ischia_code read_tokens(struct store *store, struct token_list *ret,
                                     struct ischia_error *err)
 {
-    struct token_list list = {NULL, 0, false};
+    struct token_list list = {.now_ms = unix_ms()};
     enum ischia_code code = store_token_list(store, keep_token, &list, err);
     if (code == ISCHIA_OK && list.failed)
-        code = FAIL(err, ISCHIA_E_LIMIT, "no room for the tokens; at most %d", AUTH_TOKENS_MAX);
+        code = FAIL(err, ISCHIA_E_MEMORY, "no memory for the tokens");
+    if (code == ISCHIA_OK && list.refused > 0)
+        LOG_WARNING("too many tokens; the newest are not known", "known=%zu unknown=%zu",
+                    list.count, list.refused);
     if (code == ISCHIA_OK)
         *ret = list;
     else
@@ -128,14 +162,31 @@ void auth_destroy(struct auth *auth)
     free(auth);
 }
 
+void auth_require(struct auth *auth) { auth->required = true; }
+
+static void say_failing(struct auth *auth, const struct ischia_error *err)
+{
+    struct log_value detail;
+    if (!atomic_exchange(&auth->failing, true))
+        LOG_ERROR("the tokens cannot be read; those known stay", "detail=%s",
+                  log_quote(&detail, err->message));
+}
+
 /* Reads the tokens again when they changed. When the store cannot be read the tokens known stay:
  * to forget them would open the door. */
 static void reload(struct auth *auth)
 {
-    struct token_list list = {NULL, 0, false};
+    struct token_list list = {0};
+    struct ischia_error err = {0};
     int64_t epoch = 0;
-    if (store_token_epoch(auth->store, &epoch, NULL) != ISCHIA_OK || epoch == auth->epoch) return;
-    if (read_tokens(auth->store, &list, NULL) != ISCHIA_OK) return;
+    enum ischia_code code = store_token_epoch(auth->store, &epoch, &err);
+    if (code == ISCHIA_OK && epoch != auth->epoch) code = read_tokens(auth->store, &list, &err);
+    if (code != ISCHIA_OK) {
+        say_failing(auth, &err);
+        return;
+    }
+    atomic_store(&auth->failing, false);
+    if (epoch == auth->epoch) return;
     (void)pthread_rwlock_wrlock(&auth->lock);
     struct store_token *old = auth->list.token;
     auth->list = list;
@@ -162,6 +213,15 @@ bool auth_has_tokens(struct auth *auth)
     const bool has = auth->list.count > 0;
     (void)pthread_rwlock_unlock(&auth->lock);
     return has;
+}
+
+bool auth_asks(struct auth *auth)
+{
+    refresh(auth);
+    (void)pthread_rwlock_rdlock(&auth->lock);
+    const bool asks = auth->required || auth->list.in_use;
+    (void)pthread_rwlock_unlock(&auth->lock);
+    return asks;
 }
 
 /* The token inside "Bearer x" or "Basic base64(user:x)". False when there is none. */
@@ -221,7 +281,7 @@ static enum auth_verdict judge(const struct auth *auth, const char *header, int6
     sodium_memzero(text, sizeof text);
     const struct store_token *token = match_token(auth, id, hash);
     if (token == NULL) return AUTH_BAD_TOKEN;
-    if (token->expires_ms != 0 && now_ms >= token->expires_ms) return AUTH_EXPIRED;
+    if (is_expired(token, now_ms)) return AUTH_EXPIRED;
     (void)snprintf(ret_identity->id, sizeof ret_identity->id, "%s", id);
     ret_identity->scopes = token->scopes;
     return AUTH_GRANTED;
@@ -234,10 +294,10 @@ enum auth_verdict auth_check(struct auth *auth, const char *header, int64_t now_
     *ret_identity = (struct auth_identity){.id = "-", .scopes = 0};
     refresh(auth);
     (void)pthread_rwlock_rdlock(&auth->lock);
-    if (auth->list.count == 0)
-        ret_identity->scopes = AUTH_ALL;
-    else
+    if (auth->required || auth->list.in_use)
         verdict = judge(auth, header, now_ms, ret_identity);
+    else
+        ret_identity->scopes = AUTH_ALL;
     (void)pthread_rwlock_unlock(&auth->lock);
     return verdict;
 }
@@ -251,6 +311,23 @@ bool auth_user(const char *name, unsigned scopes, struct auth_identity *ret_iden
     (void)snprintf(ret_identity->id, sizeof ret_identity->id, "user:%s", name);
     ret_identity->scopes = scopes;
     return true;
+}
+
+static bool count_holding(void *context, const struct store_token *token)
+{
+    struct token_list *list = context;
+    list->count += token->revoked_ms == 0 && !is_expired(token, list->now_ms);
+    return true;
+}
+
+static enum ischia_code check_room(struct store *store, struct ischia_error *err)
+{
+    struct token_list holding = {.now_ms = unix_ms()};
+    TRY(store_token_list(store, count_holding, &holding, err));
+    CHECK(holding.count < AUTH_TOKENS_MAX, err, ISCHIA_E_LIMIT,
+          "there are %zu tokens that hold, and a service knows at most %d: revoke some first",
+          holding.count, AUTH_TOKENS_MAX);
+    return ISCHIA_OK;
 }
 
 enum ischia_code auth_token_create(struct store *store, unsigned scopes, int64_t expires_ms,
@@ -267,6 +344,7 @@ enum ischia_code auth_token_create(struct store *store, unsigned scopes, int64_t
     for (const char *c = name; *c != '\0'; c++)
         CHECK(!iscntrl((unsigned char)*c), err, ISCHIA_E_INPUT,
               "the name holds a control character");
+    TRY(check_room(store, err));
     randombytes_buf(id, sizeof id);
     randombytes_buf(secret, sizeof secret);
     (void)sodium_bin2hex(token.id, AUTH_ID_BYTES, id, sizeof id);
@@ -290,6 +368,12 @@ enum ischia_code auth_token_revoke(struct store *store, const char *id, struct i
           "no token has the id '%.32s'; see `ischiad token list`", id);
     CHECK(answer != STORE_CONFLICT, err, ISCHIA_E_STATE, "the token %.32s was revoked before", id);
     return ISCHIA_OK;
+}
+
+enum ischia_code auth_token_forget(struct store *store, int64_t *ret_count,
+                                   struct ischia_error *err)
+{
+    return store_token_forget(store, ret_count, err);
 }
 
 static void print_date(FILE *out, int64_t when_ms)

@@ -17,6 +17,11 @@
  *
  * A running daemon keeps the tokens in memory and notices within a second when one was added or
  * revoked, also by another process.
+ *
+ * Without tokens everything is granted. The first one shuts the door, and neither revoking nor
+ * expiry opens it again: that would turn a stolen token that is revoked into no token at all. Only
+ * to forget revoked and expired tokens, until there is none, goes back to the beginning; where
+ * auth_require was called not even that does.
  */
 
 #define AUTH_TOKEN_PREFIX "ischia_"
@@ -28,7 +33,7 @@ enum auth_scope {
 };
 enum { AUTH_ALL = AUTH_READ | AUTH_ASSESS | AUTH_ADMIN };
 
-enum { AUTH_ID_BYTES = 17, AUTH_TOKEN_BYTES = 80, AUTH_TOKENS_MAX = 4096 };
+enum { AUTH_ID_BYTES = 17, AUTH_TOKEN_BYTES = 80, AUTH_TOKENS_MAX = 4096 /* that hold */ };
 enum { AUTH_USER_MAX = 64, AUTH_WHO_BYTES = sizeof "user:" + AUTH_USER_MAX };
 
 struct auth_identity {
@@ -47,14 +52,19 @@ ISCHIA_MUST_CHECK enum ischia_code auth_create(struct auth **ret, struct store *
                                                struct ischia_error *err);
 void auth_destroy(struct auth *auth); /* NULL allowed */
 
-/* True when at least one token exists that is not revoked, expired or not: then every request needs
- * one. */
+/* From now on every request needs a token, even where none exists. Before other threads ask. */
+void auth_require(struct auth *auth);
+
+/* True when at least one token exists that is not revoked, expired or not. */
 bool auth_has_tokens(struct auth *auth);
+
+/* True when every request needs a token. */
+bool auth_asks(struct auth *auth);
 
 /*
  * Judges an Authorization header (NULL: none) at now_ms (Unix time): "Bearer TOKEN", or "Basic"
  * with the token as password, which lets a browser ask for it. Takes the same time whether or not
- * the id exists. With no tokens everything is granted. May be called from any thread.
+ * the id exists. Where auth_asks is false everything is granted. May be called from any thread.
  */
 enum auth_verdict auth_check(struct auth *auth, const char *header, int64_t now_ms,
                              struct auth_identity *ret_identity);
@@ -67,13 +77,16 @@ bool auth_user(const char *name, unsigned scopes, struct auth_identity *ret_iden
 unsigned auth_parse_scopes(const char *text);
 
 /* The administration commands. create returns the whole token, which is nowhere else. expires_ms 0:
- * never. name: what it is for. ISCHIA_E_STATE when an id to revoke does not exist. */
+ * never. name: what it is for; ISCHIA_E_LIMIT when AUTH_TOKENS_MAX hold. ISCHIA_E_STATE when an id
+ * to revoke does not exist. forget erases those that are revoked or expired. */
 ISCHIA_MUST_CHECK enum ischia_code
 auth_token_create(struct store *store, unsigned scopes, int64_t expires_ms, const char *name,
                   char ret_token[AUTH_TOKEN_BYTES], struct ischia_error *err);
 ISCHIA_MUST_CHECK enum ischia_code auth_token_list(struct store *store, FILE *out,
                                                    struct ischia_error *err);
 ISCHIA_MUST_CHECK enum ischia_code auth_token_revoke(struct store *store, const char *id,
+                                                     struct ischia_error *err);
+ISCHIA_MUST_CHECK enum ischia_code auth_token_forget(struct store *store, int64_t *ret_count,
                                                      struct ischia_error *err);
 
 #endif

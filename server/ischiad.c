@@ -316,6 +316,7 @@ static enum ischia_code check_access(struct daemon *d, struct ischia_error *err)
           "%s is not a loopback address and there are no tokens: make one with `ischiad token "
           "create`, or give --behind-proxy when a reverse proxy does access control",
           s->config.listen);
+    auth_require(s->auth);
     return ISCHIA_OK;
 }
 

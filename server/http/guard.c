@@ -37,7 +37,7 @@ static bool host_is_ours(const struct call *call)
     const char *header = http_request_header(call->request, "Host");
     if (header == NULL || !query_host(header, host, sizeof host)) return false;
     if (is_own_host(call->service, host)) return true;
-    return call->service->config.allowed_hosts[0] == '\0' && auth_has_tokens(call->service->auth);
+    return call->service->config.allowed_hosts[0] == '\0' && auth_asks(call->service->auth);
 }
 
 /* "https://name:port" against the Host that was asked for. */

@@ -390,6 +390,9 @@ store_token_get(struct store *store, const char *id, struct store_token *ret,
 ISCHIA_MUST_CHECK enum ischia_code store_token_revoke(struct store *store, const char *id,
                                                       enum store_answer *ret_answer,
                                                       struct ischia_error *err);
+/* Erases those that are revoked or expired; *ret_count: how many. */
+ISCHIA_MUST_CHECK enum ischia_code store_token_forget(struct store *store, int64_t *ret_count,
+                                                      struct ischia_error *err);
 typedef bool store_on_token(void *context, const struct store_token *token);
 ISCHIA_MUST_CHECK enum ischia_code store_token_list(struct store *store, store_on_token *on_token,
                                                     void *context, struct ischia_error *err);

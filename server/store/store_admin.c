@@ -112,6 +112,28 @@ enum ischia_code store_token_revoke(struct store *store, const char *id,
     return ISCHIA_OK;
 }
 
+/* The triggers move the epoch for what is added or changed, not for what goes. */
+static enum ischia_code token_forget_run(struct store *store, struct db *db, void *operation,
+                                         struct ischia_error *err)
+{
+    struct query query;
+    query_begin(&query, db, SQL_TOKEN_FORGET);
+    query_put_integer(&query, store_now_ms(store));
+    TRY(query_change(&query, operation, err));
+    query_begin(&query, db, SQL_TOKEN_EPOCH_MOVE);
+    return query_run(&query, err);
+}
+
+enum ischia_code store_token_forget(struct store *store, int64_t *ret_count,
+                                    struct ischia_error *err)
+{
+    int64_t count = 0;
+    struct write write = {.run = token_forget_run, .operation = &count};
+    TRY(write_run(store, &write, err));
+    *ret_count = count;
+    return ISCHIA_OK;
+}
+
 static enum ischia_code show_tokens(struct db *db, store_on_token *on_token, void *context,
                                     struct ischia_error *err)
 {

@@ -114,6 +114,10 @@ const struct sql_text sql_text[SQL_COUNT] = {
                    "ORDER BY created_ms, id"},
     [SQL_TOKEN_REVOKE] = {.sqlite =
                               "UPDATE token SET revoked_ms = ? WHERE id = ? AND revoked_ms = 0"},
+    [SQL_TOKEN_FORGET] = {.sqlite = "DELETE FROM token WHERE revoked_ms > 0 OR (expires_ms > 0 AND "
+                                    "expires_ms <= ?)"},
+    [SQL_TOKEN_EPOCH_MOVE] = {.sqlite =
+                                  "UPDATE number SET value = value + 1 WHERE name = 'token_epoch'"},
     [SQL_TOKEN_EPOCH] = {.sqlite = "SELECT value FROM number WHERE name = 'token_epoch'"},
     [SQL_AUDIT_HEAD] = {.sqlite = "SELECT seq, hash FROM audit ORDER BY seq DESC LIMIT 1"},
     [SQL_AUDIT_ADD] =

@@ -3,6 +3,7 @@
 """Who may do what: tokens and scopes, Host and Origin, rate limits, TLS, and what start refuses."""
 import base64
 import http.client
+import json
 import os
 import re
 import signal
@@ -14,7 +15,7 @@ import unittest
 
 from service import (JSON, PATIENCE_S, PROGRAM, PROXY, Service, admin, direct_only, eventually,
                      file_only,
-                     side)
+                     side, sql)
 
 FORM = {'Content-Type': 'application/x-www-form-urlencoded'}
 
@@ -125,6 +126,48 @@ class Tokens(unittest.TestCase):
         eventually(lambda: ask() == 401, 'a revoked token to be refused')
         again = admin(state, 'token', 'revoke', identity, check=False)
         self.assertEqual(again.returncode, 1)
+
+    @direct_only('where no other token is in use')
+    def test_revoking_or_expiry_of_the_last_token_opens_nothing(self):
+        with Service() as service:
+            ask = lambda **headers: service.get('/v1/assessments', **headers).status
+            token = admin(service.state, 'token', 'create', 'scope=admin').strip()
+            eventually(lambda: ask() == 401, 'the first token to shut the door')
+            self.assertEqual(admin(service.state, 'token', 'forget').strip(), '0')
+            admin(service.state, 'token', 'revoke', token.split('_')[1])
+            eventually(lambda: ask(**bearer(token)) == 401, 'the revoking')
+            admin(service.state, 'token', 'create', 'expires=1s')
+            time.sleep(2.2)
+            self.assertEqual(ask(), 401)
+            self.assertEqual(admin(service.state, 'token', 'forget').strip(), '2')
+            eventually(lambda: ask() == 200, 'the door to open when nothing is remembered')
+
+    def make_tokens(self, state, count, expires_ms, letter):
+        sql(state, f"""WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n
+                       WHERE i < {count})
+                       INSERT INTO token (id, name, digest, scopes, created_ms, expires_ms)
+                       SELECT '{letter}' || i, 'many', (SELECT digest FROM token LIMIT 1), 1, 1,
+                       {expires_ms} FROM n""", '')
+
+    @direct_only('counts its tokens')
+    def test_any_number_of_expired_tokens_and_no_more_that_hold_than_fit(self):
+        with Service() as service:
+            state = service.state
+            token, other = (admin(state, 'token', 'create').strip() for _ in range(2))
+            ask = lambda: service.get('/v1/assessments', **bearer(token)).status
+            eventually(lambda: ask() == 200, 'a new token to be known')
+            self.make_tokens(state, 4096, 1, 'x')
+            admin(state, 'token', 'revoke', token.split('_')[1])
+            eventually(lambda: ask() == 401, 'a revoked token to be refused')
+            self.assertEqual(service.get('/v1/assessments', **bearer(other)).status, 200)
+            self.make_tokens(state, 4095, 0, 'h')
+            refused = admin(state, 'token', 'create', check=False)
+            self.assertEqual(refused.returncode, 1)
+            self.assertIn('revoke some first', refused.stderr)
+            self.assertEqual(admin(state, 'token', 'forget').strip(), '4097')
+            self.make_tokens(state, 2, 0, 'y')
+            eventually(lambda: ask() == 401 and 'known=4096 unknown=2' in service.errors(),
+                       'a line in the log')
 
     def test_everything_that_changes_or_reads_is_in_the_audit_log(self):
         token = self.tokens['read,assess']
@@ -321,6 +364,22 @@ class Doors(unittest.TestCase):
                 self.assertEqual(response.status, 200)
                 self.assertTrue(response.headers['Strict-Transport-Security'])
                 self.assertIn(connection.sock.version(), ('TLSv1.3', 'TLSv1.2'))
+                response.read()
+
+                def status(method, body=None, headers=None):
+                    connection.request(method, '/v1/assessments', body, headers or {})
+                    answer = connection.getresponse()
+                    answer.read()
+                    return answer.status
+
+                # Without its last token it lets nobody in, instead of everybody.
+                admin(state, 'token', 'revoke', token.split('_')[1])
+                eventually(lambda: status('GET', headers=bearer(token)) == 401, 'the revoking')
+                self.assertEqual(status('GET'), 401)
+                self.assertEqual(status('POST', json.dumps(side()).encode(), JSON), 401)
+                self.assertEqual(admin(state, 'token', 'forget').strip(), '1')
+                time.sleep(2.2)
+                self.assertEqual(status('GET'), 401)
                 connection.close()
 
     @direct_only('where the service itself listens')
