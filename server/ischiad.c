@@ -387,6 +387,7 @@ static enum ischia_code start_queue(struct daemon *d, struct ischia_error *err)
                  .memory_max_bytes = (size_t)config->worker_memory_mib << 20,
                  .solve_deadline_ms = config->worker_time_s * 1000},
         .queued_max = config->queue_limit,
+        .emulator = emulates ? d->service.estimator->digest : NULL,
     };
     const struct queue_watcher watcher = {d, on_note, on_finished, on_point, on_store_error};
     return queue_create(d->service.store, d->service.events, &options, &watcher, &d->service.queue,

@@ -34,6 +34,7 @@ struct queue {
     struct events *events;
     struct pool *pool;
     int queued_max, crashes_max;
+    char emulator[DIGEST_HEX_BYTES]; /* that intervals are made with */
     struct queue_watcher watcher;
     atomic_bool draining;
     pthread_mutex_t lock; /* guards on_the_way */
@@ -42,13 +43,23 @@ struct queue {
     struct verdict *owed, **last_owed; /* the pool's thread alone */
 };
 
-void queue_case_key(const char *case_json, unsigned char ret_key[STORE_DIGEST_BYTES])
+/* The text is canonical and holds no free words, so that nothing else in it reads like this. */
+static bool asks_for_interval(const char *case_json)
 {
+    return strstr(case_json, "\"sd\":") != NULL;
+}
+
+void queue_case_key(const struct queue *queue, const char *case_json,
+                    unsigned char ret_key[STORE_DIGEST_BYTES])
+{
+    enum { PARTS = 4 };
     static const unsigned char version[2] = {ISCHIA_MODEL_VERSION & 0xff,
                                              ISCHIA_MODEL_VERSION >> 8};
-    const struct digest_part parts[] = {
-        digest_text(case_json), digest_text(ISCHIA_MODEL_NAME), {version, sizeof version}};
-    digest_parts(parts, sizeof parts / sizeof parts[0], ret_key);
+    const struct digest_part parts[PARTS] = {digest_text(case_json),
+                                             digest_text(ISCHIA_MODEL_NAME),
+                                             {version, sizeof version},
+                                             digest_text(queue->emulator)};
+    digest_parts(parts, asks_for_interval(case_json) ? PARTS : PARTS - 1, ret_key);
 }
 
 static void report_store_error(struct queue *queue, const struct ischia_error *err)
@@ -464,6 +475,8 @@ enum ischia_code queue_create(struct store *store, struct events *events,
     queue->queued_max = options->queued_max;
     queue->crashes_max = options->crashes_max == 0 ? 1 : options->crashes_max;
     queue->last_owed = &queue->owed;
+    (void)snprintf(queue->emulator, sizeof queue->emulator, "%s",
+                   options->emulator == NULL ? "none" : options->emulator);
     (void)pthread_mutex_init(&queue->lock, NULL);
     (void)pthread_cond_init(&queue->arrived, NULL);
     if (watcher != NULL) queue->watcher = *watcher;
@@ -519,7 +532,7 @@ static enum ischia_code complete(const struct queue *queue, const struct store_n
     CHECK(!atomic_load(&queue->draining), err, ISCHIA_E_STATE, "the daemon is stopping");
     *ret = *what;
     ret->queued_max = queue->queued_max;
-    queue_case_key(what->case_json, ret->case_key);
+    queue_case_key(queue, what->case_json, ret->case_key);
     return ISCHIA_OK;
 }
 

@@ -25,8 +25,9 @@ struct queue;
 
 struct queue_options {
     struct pool_options pool;
-    int queued_max;  /* more are refused with STORE_FULL; 0: no limit                       */
-    int crashes_max; /* worker deaths that a job survives; < 0: none; 0: 1                  */
+    int queued_max;       /* more are refused with STORE_FULL; 0: no limit                       */
+    int crashes_max;      /* worker deaths that a job survives; < 0: none; 0: 1                  */
+    const char *emulator; /* digest of the one that the workers have, for the call; NULL: none */
 };
 
 /* For logs and metrics; called on the pool's thread, any may be NULL. None of the texts identifies
@@ -49,8 +50,9 @@ ISCHIA_MUST_CHECK enum ischia_code queue_create(struct store *store, struct even
                                                 struct queue **ret_queue, struct ischia_error *err);
 
 /* The identity of a solve: equal keys give equal results. Over the canonical case text, the model's
- * name and version. */
-void queue_case_key(const char *case_json, unsigned char ret_key[STORE_DIGEST_BYTES]);
+ * name and version and, where the case asks for an interval, the emulator that it is made with. */
+void queue_case_key(const struct queue *queue, const char *case_json,
+                    unsigned char ret_key[STORE_DIGEST_BYTES]);
 
 /* store_accept / store_accept_later, and the workers are woken. what->queued_max and case_key are
  * filled in here. After queue_drain: ISCHIA_E_STATE. */

@@ -54,15 +54,17 @@ static enum ischia_code add_point(struct studies_new *study, char *cells_json,
         free(cells_json);
         return code;
     }
-    if (request != NULL) {
-        point.case_json = text;
-        queue_case_key(text, point.case_key);
-    } else {
-        point.problem_json = text;
-    }
+    *(request != NULL ? &point.case_json : &point.problem_json) = text;
     study->point[study->what.count++] = point;
     study->what.point = study->point;
     return ISCHIA_OK;
+}
+
+void studies_put_keys(struct studies_new *study, const struct queue *queue)
+{
+    for (size_t i = 0; i < study->what.count; i++)
+        if (study->point[i].case_json != NULL)
+            queue_case_key(queue, study->point[i].case_json, study->point[i].case_key);
 }
 
 /* ------------------------------------------------------------------------------- designs */

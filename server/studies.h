@@ -36,6 +36,10 @@ ISCHIA_MUST_CHECK enum ischia_code
 studies_read_cohort(struct studies_new *ret, const char *csv, size_t length, const char *name,
                     const struct case_doc_defaults *defaults, size_t points_max,
                     struct doc_faults *faults, struct ischia_error *err);
+/* Fills in the case keys, for queue_accept_study. */
+struct queue;
+void studies_put_keys(struct studies_new *study, const struct queue *queue);
+
 void studies_new_finish(struct studies_new *study); /* a zeroed one is allowed */
 
 /* "queued", "running", "finished" or "cancelled". */

@@ -169,6 +169,7 @@ static void accept(struct call *call, struct studies_new *study, const char *key
     study->what.idempotency_key = key;
     study->what.waiting_max = call->service->config.study_limit;
     digest_parts(body, sizeof body / sizeof body[0], study->what.body_digest);
+    studies_put_keys(study, call->service->queue);
     if (queue_accept_study(call->service->queue, &study->what, &accepted, &err) != ISCHIA_OK) {
         reply_failure(call->request, ret, &err);
         return;

@@ -89,6 +89,24 @@ class Estimates(unittest.TestCase):
         self.assertEqual(self.service.get('/v1/changes').json()['last_seq'], 0)
 
 
+class Intervals(unittest.TestCase):
+    """The cache gives back no interval that another emulator, or none, made."""
+
+    def test_another_emulator_solves_again(self):
+        bare, uncertain = {}, {'sd': 'typical'}
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, 'emulator.txt')
+            write_emulator(path)
+            ask = lambda service, sd: service.submit(**INSIDE, **sd)['cached']
+            with Service('--emulator', 'none', state=folder) as service:
+                self.assertEqual([ask(service, sd) for sd in (bare, uncertain)], [False, False])
+                self.assertEqual([ask(service, sd) for sd in (bare, uncertain)], [True, True])
+            for solved in (False, True):
+                with Service('--emulator', path, state=folder) as service:
+                    self.assertEqual(ask(service, bare), True)
+                    self.assertEqual(ask(service, uncertain), solved)
+
+
 class WhatIf(unittest.TestCase):
     """POST /v1/estimates/what-if: the same numbers along one input."""
 

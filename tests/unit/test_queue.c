@@ -312,7 +312,7 @@ static struct uuid accept_study(struct room *room, const char *const *cases, siz
     assert_true(count <= 8);
     for (size_t i = 0; i < count; i++) {
         point[i] = (struct store_study_point_new){.cells_json = "[]", .case_json = cases[i]};
-        queue_case_key(cases[i], point[i].case_key);
+        queue_case_key(room->queue, cases[i], point[i].case_key);
     }
     const struct store_study_new what = {
         .name = "s", .columns_json = "[]", .client = "", .count = count, .point = point};
