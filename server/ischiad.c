@@ -265,7 +265,6 @@ static enum ischia_code open_store(struct daemon *d, struct ischia_error *err)
     const struct store_options options = {
         .location = config->store[0] == '\0' ? config->state_dir : config->store,
         .mode = STORE_SERVE,
-        .idempotency_ms = (int64_t)config->idempotency_hours * 3600 * 1000,
     };
     return open_patiently(&options, &d->service.store, err);
 }
@@ -487,7 +486,6 @@ static enum ischia_code start_hl7(struct daemon *d, struct ischia_error *err)
                                              .application = config->hl7_application,
                                              .facility = config->hl7_facility,
                                              .tls = d->hl7_tls,
-                                             .queue_limit = config->queue_limit,
                                              .queue = d->service.queue,
                                              .audit = d->service.audit};
     return listener_start(&d->hl7, &options, err);

@@ -33,7 +33,8 @@ struct queue {
     struct store *store;
     struct events *events;
     struct pool *pool;
-    int queued_max, crashes_max;
+    atomic_int queued_max;
+    int crashes_max;
     char emulator[DIGEST_HEX_BYTES]; /* that intervals are made with */
     struct queue_watcher watcher;
     atomic_bool draining;
@@ -472,7 +473,7 @@ enum ischia_code queue_create(struct store *store, struct events *events,
     CHECK(queue != NULL, err, ISCHIA_E_MEMORY, "no memory for the queue");
     queue->store = store;
     queue->events = events;
-    queue->queued_max = options->queued_max;
+    queue_set_limit(queue, options->queued_max);
     queue->crashes_max = options->crashes_max == 0 ? 1 : options->crashes_max;
     queue->last_owed = &queue->owed;
     (void)snprintf(queue->emulator, sizeof queue->emulator, "%s",
@@ -524,6 +525,11 @@ void queue_destroy(struct queue *queue, int grace_ms)
 
 struct pool *queue_pool(struct queue *queue) { return queue->pool; }
 
+void queue_set_limit(struct queue *queue, int queued_max)
+{
+    atomic_store_explicit(&queue->queued_max, queued_max, memory_order_relaxed);
+}
+
 /* ----------------------------------------------------------------------------- customers */
 
 static enum ischia_code complete(const struct queue *queue, const struct store_new *what,
@@ -531,7 +537,7 @@ static enum ischia_code complete(const struct queue *queue, const struct store_n
 {
     CHECK(!atomic_load(&queue->draining), err, ISCHIA_E_STATE, "the daemon is stopping");
     *ret = *what;
-    ret->queued_max = queue->queued_max;
+    ret->queued_max = atomic_load_explicit(&queue->queued_max, memory_order_relaxed);
     queue_case_key(queue, what->case_json, ret->case_key);
     return ISCHIA_OK;
 }

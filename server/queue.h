@@ -82,6 +82,9 @@ ISCHIA_MUST_CHECK enum ischia_code queue_cancel_study(struct queue *queue, const
 
 struct pool *queue_pool(struct queue *queue); /* for renders and stats */
 
+/* Another queued_max, for what comes from now on. Any thread. */
+void queue_set_limit(struct queue *queue, int queued_max);
+
 /* Accepts and starts nothing more; running solves go on. Does not wait. */
 void queue_drain(struct queue *queue);
 

@@ -101,7 +101,6 @@ static enum hl7_ack submit(struct listener *l, const struct hl7_input *input, co
     if (code == ISCHIA_OK) {
         intake.what.client = client;
         intake.what.idempotency_key = input->head.control_id;
-        intake.what.queued_max = l->options.queue_limit;
         digest_parts(&body, 1, intake.what.body_digest);
         code = queue_accept(l->options.queue, &intake.what, &accepted, &err);
         intake_finish(&intake);

@@ -22,7 +22,6 @@ struct listener_options {
     const char *application; /* MSH-3 of what we send                       */
     const char *facility;    /* MSH-4                                       */
     struct link_tls *tls;    /* NULL: plain; the caller's                   */
-    int queue_limit;         /* assessments; 0: none                        */
     struct queue *queue;     /* the caller's, outlives the listener         */
     struct audit *audit;     /* likewise                                    */
 };

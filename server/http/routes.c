@@ -583,7 +583,8 @@ void service_apply(struct service *service)
 {
     atomic_store(&service->rate_limit, service->config.rate_limit);
     atomic_store(&service->rate_burst, service->config.rate_burst);
-    atomic_store(&service->queue_limit, service->config.queue_limit);
+    if (service->queue != NULL) queue_set_limit(service->queue, service->config.queue_limit);
+    store_set_idempotency(service->store, (int64_t)service->config.idempotency_hours * 3600 * 1000);
     audit_set_mode(service->audit, (enum config_audit)service->config.audit);
     log_set_level((enum log_level)service->config.log_level);
 }

@@ -32,12 +32,12 @@ struct service {
     struct trust *trust;         /* who may call CDS services; NULL: as everywhere, by token */
     /* Read at every request and changed by SIGHUP, hence atomic; the rest of config is constant. */
     struct config config;
-    atomic_int rate_limit, rate_burst, queue_limit;
+    atomic_int rate_limit, rate_burst;
     bool on_loopback; /* listens there only */
     atomic_bool draining;
 };
 
-/* The options that SIGHUP may change, from config into the atomics and the audit log. */
+/* The options that SIGHUP may change, from config to the parts that go by them. */
 void service_apply(struct service *service);
 
 /* The application that http_start wants. */

@@ -61,8 +61,6 @@ static enum ischia_code enqueue(struct call *call, const struct ischia_request *
     TRY(intake_init(&intake, request, origin, err));
     intake.what.client = call->who.id;
     intake.what.idempotency_key = key;
-    intake.what.queued_max =
-        atomic_load_explicit(&call->service->queue_limit, memory_order_relaxed);
     digest_parts(&body, 1, intake.what.body_digest);
     struct deferred *deferred = deferred_create(call);
     enum ischia_code code =

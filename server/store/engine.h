@@ -3,6 +3,7 @@
 #define ISCHIA_SERVER_STORE_ENGINE_H
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -257,7 +258,7 @@ struct store {
     const struct engine *engine;
     void *place; /* the engine's own */
     int busy_timeout_ms;
-    int64_t idempotency_ms;
+    atomic_llong idempotency_ms;
     int64_t (*now_ms)(void);
 
     pthread_mutex_t reader_lock;

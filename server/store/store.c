@@ -103,13 +103,18 @@ static enum ischia_code first_reader(struct store *store, struct ischia_error *e
 
 /* --------------------------------------------------------------------------- open, close */
 
+void store_set_idempotency(struct store *store, int64_t idempotency_ms)
+{
+    atomic_store(&store->idempotency_ms,
+                 idempotency_ms > 0 ? idempotency_ms : STORE_IDEMPOTENCY_MS);
+}
+
 static void set_up(struct store *store, const struct store_options *options)
 {
     store->last = &store->first;
     store->busy_timeout_ms =
         options->busy_timeout_ms > 0 ? options->busy_timeout_ms : BUSY_TIMEOUT_MS;
-    store->idempotency_ms =
-        options->idempotency_ms > 0 ? options->idempotency_ms : STORE_IDEMPOTENCY_MS;
+    store_set_idempotency(store, options->idempotency_ms);
     store->now_ms = options->now_ms;
     (void)pthread_mutex_init(&store->reader_lock, NULL);
     (void)pthread_cond_init(&store->reader_free, NULL);

@@ -80,6 +80,9 @@ ISCHIA_MUST_CHECK enum ischia_code store_open(const struct store_options *option
  * thread. NULL allowed. */
 void store_close(struct store *store);
 
+/* Another idempotency_ms (0: 24 h), for old keys as for new ones. Any thread. */
+void store_set_idempotency(struct store *store, int64_t idempotency_ms);
+
 /* ------------------------------------------------------------------ assessments: accepting */
 
 struct store_new {

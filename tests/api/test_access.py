@@ -300,6 +300,46 @@ class Rates(unittest.TestCase):
                 )
 
 
+class Reload(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.path = os.path.join(folder.name, 'ischiad.conf')
+
+    def write(self, **options):
+        with open(self.path, 'w', encoding='utf-8') as file:
+            file.writelines(f'{name} = {value}\n' for name, value in options.items())
+
+    def reload(self, service, **options):
+        self.write(**options)
+        service.signal(signal.SIGHUP)
+        eventually(lambda: 'need_restart=""' in service.errors(), 'the reload')
+
+    def test_the_queue_s_limit_follows_its_option(self):
+        self.write(queue_limit=1000)
+        with Service('--config', self.path) as service:
+            ids = [service.submit(wait=0, F=599, eM=20 + i)['id'] for i in range(3)]
+            service.until(ids[0], 'running')
+            self.reload(service, queue_limit=2)
+            answer = service.ask('POST', '/v1/assessments', side(F=599, eM=31))
+            self.assertEqual(answer.status, 429)
+
+    def test_how_long_keys_are_remembered_follows_its_option(self):
+        self.write(idempotency_hours=3)
+        with Service('--config', self.path) as service:
+
+            def identity():
+                key = {'Idempotency-Key': 'a-1'}
+                answer = service.ask('POST', '/v1/assessments', side(F=130.5), key)
+                return answer.json()['id']
+
+            first = identity()
+            sql(service.state, 'UPDATE idempotency SET created_ms = created_ms - 7200000', first)
+            self.assertEqual(identity(), first)
+            self.reload(service, idempotency_hours=1)
+            self.assertNotEqual(identity(), first)
+
+
 class Doors(unittest.TestCase):
     def refuses(self, *options):
         with tempfile.TemporaryDirectory() as state:
