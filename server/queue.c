@@ -122,6 +122,20 @@ static enum ischia_code write_verdict(struct queue *queue, const struct verdict 
     }
 }
 
+/* Whoever cancelled it has told those who wait; that its solve is over is told here. */
+static void announce_if_cancelled(struct queue *queue, const struct verdict *verdict)
+{
+    struct store_assessment a = {0};
+    struct ischia_error err = {0};
+    enum store_answer answer = STORE_NOT_FOUND;
+    if (verdict->line != 0 || queue->watcher.on_finished == NULL) return;
+    if (store_peek(queue->store, &verdict->id, &a, &answer, &err) != ISCHIA_OK)
+        report_store_error(queue, &err);
+    else if (answer == STORE_DONE && a.state == QUEUE_CANCELLED)
+        queue->watcher.on_finished(queue->watcher.context, &verdict->id, a.state, verdict->end,
+                                   verdict->wall_ms, verdict->detail);
+}
+
 /* False when the store could not take it now. STORE_CONFLICT: it was cancelled, or restored from a
  * backup, meanwhile: what the worker found is no longer wanted. */
 static bool settle(struct queue *queue, const struct verdict *verdict)
@@ -133,6 +147,7 @@ static bool settle(struct queue *queue, const struct verdict *verdict)
         return false;
     }
     if (answer == STORE_DONE) announce(queue, verdict);
+    if (answer == STORE_CONFLICT) announce_if_cancelled(queue, verdict);
     return true;
 }
 

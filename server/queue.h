@@ -34,6 +34,7 @@ struct queue_options {
  * a person. */
 struct queue_watcher {
     void *context;
+    /* on_finished: also of a solve that was cancelled; not of what is cancelled while it waits. */
     void (*on_note)(void *context, const struct pool_note *note);
     void (*on_finished)(void *context, const struct uuid *id, enum queue_state state,
                         enum pool_end end, int64_t wall_ms, const char *detail);

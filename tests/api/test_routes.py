@@ -12,7 +12,7 @@ import time
 import unittest
 import urllib.parse
 
-from service import JSON, SIDE, Answer, Service, direct_only, side
+from service import JSON, SIDE, Answer, Service, direct_only, eventually, side
 
 ABSENT = '/v1/assessments/01a201a9-49a6-75d9-8b79-1f36e7bd6914'
 
@@ -384,6 +384,10 @@ class Routes(unittest.TestCase):
         self.assertNotIn('http-equiv', page)  # a page never reloads by itself
         self.assertEqual(self.service.ask('POST', path + '/cancel').json()['status'], 'cancelled')
         self.assertEqual(self.service.ask('POST', path + '/cancel').status, 200)
+        ended = f'event="assessment ended" id={document["id"]} status=cancelled end=cancelled'
+        eventually(lambda: ended in self.service.errors(), ended)
+        metrics = self.service.get('/metrics').body.decode()
+        self.assertRegex(metrics, r'ischia_solve_seconds_count\{outcome="cancelled"\} [1-9]')
         self.assertEqual(self.service.submit(F=213.5)['status'], 'succeeded')
 
     def test_cancel_of_what_has_ended_is_409(self):

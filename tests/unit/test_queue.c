@@ -25,7 +25,7 @@ struct room {
     struct store *store;
     struct events *events;
     struct queue *queue;
-    int finished, points, store_errors;
+    int finished, cancelled, points, store_errors;
 };
 
 static const char *const command[] = {FAKE_WORKER, NULL};
@@ -35,9 +35,9 @@ static void on_finished(void *context, const struct uuid *id, enum queue_state s
 {
     struct room *room = context;
     (void)id;
-    (void)state;
     (void)end;
     (void)detail;
+    if (state == QUEUE_CANCELLED) (void)__atomic_add_fetch(&room->cancelled, 1, __ATOMIC_SEQ_CST);
     if (wall_ms >= 0) (void)__atomic_add_fetch(&room->finished, 1, __ATOMIC_SEQ_CST);
 }
 
@@ -250,6 +250,8 @@ static void test_cancel_stops_what_runs_and_what_waits(void **state)
     struct pool_stats stats;
     pool_stats(queue_pool(room->queue), &stats);
     assert_int_equal(stats.cancelled, 1); /* a process really ended */
+    await_told(&room->finished, 2);       /* the one that ran, and the next */
+    assert_int_equal(__atomic_load_n(&room->cancelled, __ATOMIC_SEQ_CST), 1);
 }
 
 static void test_full_queue_and_cache(void **state)
