@@ -179,40 +179,55 @@ static void append(struct topic *topic, const struct event *event)
     *event_at(topic, topic->count++) = *event;
 }
 
-void events_publish(struct events *events, const struct uuid *id, const struct event *event)
+/* Under the lock. topic: NULL allowed. */
+static void tell(struct events *events, struct topic *topic, const struct event *event)
 {
     struct event numbered = *event;
     numbered.at_ms = now_us() / 1000;
-    (void)pthread_mutex_lock(&events->lock);
     numbered.id = ++events->last_id;
+    if (topic == NULL) return;
+    append(topic, &numbered);
+    if (event->kind == EVENT_DONE) topic->ended_ms = numbered.at_ms;
+    for (struct events_subscription *s = topic->listeners; s != NULL; s = s->next)
+        s->notify(s->context);
+}
+
+void events_publish(struct events *events, const struct uuid *id, const struct event *event)
+{
+    (void)pthread_mutex_lock(&events->lock);
     /* A subscriber has made its topic. Where there is none nobody waits, and the store says how it
      * ended: an end alone is not kept. */
-    struct topic *topic = event->kind == EVENT_DONE ? find(events, id) : find_or_make(events, id);
-    if (topic != NULL) {
-        append(topic, &numbered);
-        if (event->kind == EVENT_DONE) topic->ended_ms = numbered.at_ms;
-        for (struct events_subscription *s = topic->listeners; s != NULL; s = s->next)
-            s->notify(s->context);
-    }
+    tell(events, event->kind == EVENT_DONE ? find(events, id) : find_or_make(events, id), event);
+    (void)pthread_mutex_unlock(&events->lock);
+}
+
+void events_erased(struct events *events, const struct uuid *id)
+{
+    const struct event done = {.kind = EVENT_DONE, .state = QUEUE_CANCELLED};
+    (void)pthread_mutex_lock(&events->lock);
+    struct topic *topic = find(events, id);
+    if (topic != NULL && topic->ended_ms == 0) tell(events, topic, &done);
     (void)pthread_mutex_unlock(&events->lock);
 }
 
 /* Also forgets topics without events: somebody listened to an id about which nothing happened. */
-static bool is_stale(const struct topic *topic, int64_t now_ms, int64_t age_ms)
+static bool is_stale(const struct topic *topic, int64_t now_ms, int64_t age_ms, int64_t silent_ms)
 {
     if (topic->listeners != NULL) return false;
     if (topic->count == 0) return true;
+    const int64_t last_ms = topic->ring[(topic->oldest + topic->count - 1) % EVENTS_RING].at_ms;
+    if (now_ms - last_ms >= silent_ms) return true;
     return topic->ended_ms != 0 && now_ms - topic->ended_ms >= age_ms;
 }
 
-void events_sweep(struct events *events, int64_t age_ms)
+void events_sweep(struct events *events, int64_t age_ms, int64_t silent_ms)
 {
     const int64_t now_ms = now_us() / 1000;
     (void)pthread_mutex_lock(&events->lock);
     for (size_t b = 0; b < BUCKETS; b++)
         for (struct topic **link = &events->bucket[b]; *link != NULL;) {
             struct topic *topic = *link;
-            if (!is_stale(topic, now_ms, age_ms)) {
+            if (!is_stale(topic, now_ms, age_ms, silent_ms)) {
                 link = &topic->next;
                 continue;
             }

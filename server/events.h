@@ -70,8 +70,14 @@ bool events_fraction(struct events *events, const struct uuid *id, double *ret_f
  * drops its oldest. Only an event that nobody listens to can be dropped for want of memory. */
 void events_publish(struct events *events, const struct uuid *id, const struct event *event);
 
-/* Forgets topics that ended more than `age_ms` ago and have no subscriber. */
-void events_sweep(struct events *events, int64_t age_ms);
+/* Its assessment was erased: who listens is told that it is over, as cancelled, unless it had ended
+ * before. */
+void events_erased(struct events *events, const struct uuid *id);
+
+/* Forgets topics without a subscriber that ended at least `age_ms` ago, or about which nothing was
+ * heard for `silent_ms`: their end may never come, when a backup without them was restored say. */
+void events_sweep(struct events *events, int64_t age_ms, int64_t silent_ms);
+enum { EVENTS_SILENT_MS = 24 * 3600 * 1000 };
 
 /* How many subscriptions there are, over all topics. */
 size_t events_subscriber_count(struct events *events);

@@ -552,7 +552,7 @@ static void tick(struct daemon *d)
 {
     const int64_t now_ms = http_now_ms();
     const int watchdog_ms = notify_watchdog_ms();
-    events_sweep(d->service.events, SWEEP_AGE_MS);
+    events_sweep(d->service.events, SWEEP_AGE_MS, EVENTS_SILENT_MS);
     if (watchdog_ms > 0 && now_ms >= d->watchdog_at_ms) {
         (void)notify_manager("WATCHDOG=1");
         d->watchdog_at_ms = now_ms + watchdog_ms;

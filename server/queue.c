@@ -393,7 +393,7 @@ static void on_tick(void *context)
 {
     struct queue *queue = context;
     (void)pay_what_is_owed(queue);
-    events_sweep(queue->events, EVENTS_AGE_MS);
+    events_sweep(queue->events, EVENTS_AGE_MS, EVENTS_SILENT_MS);
 }
 
 /* ----------------------------------------------------------------- what other daemons do */
@@ -413,7 +413,9 @@ static void on_change(void *context, const struct store_change *change)
     const enum queue_state state = state_after[change->kind];
     if (state == QUEUE_QUEUED) pool_wake(queue->pool);
     if (state == QUEUE_CANCELLED) pool_cancel(queue->pool, &change->id);
-    if (change->kind != STORE_CHANGE_CREATED && change->kind != STORE_CHANGE_ERASED)
+    if (change->kind == STORE_CHANGE_ERASED)
+        events_erased(queue->events, &change->id);
+    else if (change->kind != STORE_CHANGE_CREATED)
         publish_state(queue, &change->id, state);
 }
 

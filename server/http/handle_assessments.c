@@ -262,5 +262,6 @@ void handle_erase(struct call *call, struct http_response *ret)
         return;
     }
     documents_forget(call->service->documents, &call->id);
+    events_erased(call->service->events, &call->id);
     ret->status = 204;
 }

@@ -23,6 +23,7 @@ static int tear_down(void **state)
 
 static const struct uuid topic = {{1, 2, 3}};
 static const struct uuid other = {{9, 9, 9}};
+enum { DAY_MS = EVENTS_SILENT_MS };
 
 static void count(void *context) { (void)__atomic_add_fetch((int *)context, 1, __ATOMIC_SEQ_CST); }
 
@@ -92,19 +93,52 @@ static void test_sweeps_what_nobody_needs(void **state)
     struct ischia_error err;
     int heard = 0;
     publish(*state, 0.5);
-    events_sweep(*state, 0); /* has not ended */
+    events_sweep(*state, 0, DAY_MS); /* has not ended */
     assert_int_equal(events_read(*state, &topic, 0, got, 4), 1);
     assert_int_equal(events_subscribe(*state, &topic, count, &heard, &listener, &err), ISCHIA_OK);
     publish_done(*state);
-    events_sweep(*state, 0); /* somebody listens */
+    events_sweep(*state, 0, DAY_MS); /* somebody listens */
     assert_int_equal(events_read(*state, &topic, 0, got, 4), 2);
     assert_int_equal(got[1].kind, EVENT_DONE);
     events_unsubscribe(listener);
-    events_sweep(*state, 60000); /* too young */
+    events_sweep(*state, 60000, DAY_MS); /* too young */
     assert_int_equal(events_read(*state, &topic, 0, got, 4), 2);
-    events_sweep(*state, 0);
+    events_sweep(*state, 0, DAY_MS);
     assert_int_equal(events_read(*state, &topic, 0, got, 4), 0);
     publish_done(*state); /* an end alone is the store's to tell */
+    assert_int_equal(events_read(*state, &topic, 0, got, 4), 0);
+}
+
+/* It ran, went back into the queue when its worker died, and was erased there. */
+static void test_an_erased_assessment_is_over(void **state)
+{
+    struct events_subscription *listener;
+    struct event got[4];
+    struct ischia_error err;
+    int heard = 0;
+    assert_int_equal(events_subscribe(*state, &topic, count, &heard, &listener, &err), ISCHIA_OK);
+    publish(*state, 0.5);
+    events_erased(*state, &topic);
+    events_erased(*state, &topic); /* ended: nothing more */
+    events_erased(*state, &other); /* nobody knows it */
+    assert_int_equal(heard, 2);
+    assert_int_equal(events_read(*state, &topic, 0, got, 4), 2);
+    assert_int_equal(got[1].kind, EVENT_DONE);
+    assert_int_equal(got[1].state, QUEUE_CANCELLED);
+    events_unsubscribe(listener);
+    events_sweep(*state, 0, DAY_MS);
+    assert_int_equal(events_read(*state, &topic, 0, got, 4), 0);
+    publish_done(*state);
+    assert_int_equal(events_read(*state, &topic, 0, got, 4), 0);
+}
+
+static void test_what_falls_silent_is_forgotten(void **state)
+{
+    struct event got[4];
+    publish(*state, 0.5);
+    events_sweep(*state, 0, DAY_MS);
+    assert_int_equal(events_read(*state, &topic, 0, got, 4), 1);
+    events_sweep(*state, 0, 0);
     assert_int_equal(events_read(*state, &topic, 0, got, 4), 0);
 }
 
@@ -129,7 +163,7 @@ static void test_many_threads(void **state)
         assert_int_equal(events_subscribe(*state, &topic, count, &ignored, &brief, &err),
                          ISCHIA_OK);
         events_unsubscribe(brief);
-        events_sweep(*state, 0);
+        events_sweep(*state, 0, DAY_MS);
     }
     for (int i = 0; i < 4; i++) assert_int_equal(pthread_join(thread[i], NULL), 0);
     assert_int_equal(heard, 8000);
@@ -145,6 +179,8 @@ int main(void)
         EVENTS_TEST(test_keeps_the_newest),
         EVENTS_TEST(test_wakes_its_listeners_only),
         EVENTS_TEST(test_sweeps_what_nobody_needs),
+        EVENTS_TEST(test_an_erased_assessment_is_over),
+        EVENTS_TEST(test_what_falls_silent_is_forgotten),
         EVENTS_TEST(test_many_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
