@@ -130,6 +130,7 @@ static enum ischia_code insert_assessment(struct db *db, const struct accept *ac
     query_put_integer(&query, change_seq);
     query_put_integer(&query, now_ms);
     query_put_integer(&query, solution != 0 ? now_ms : 0);
+    query_put_integer(&query, solution != 0 ? now_ms : 0);
     if (solution != 0)
         query_put_integer(&query, solution);
     else
@@ -329,15 +330,21 @@ static enum ischia_code put_solution(struct store *store, struct db *db,
     return query_number(&query, 0, ret_rowid, err);
 }
 
+/* What was solved before begins and ends now. */
 static enum ischia_code mark_succeeded(struct store *store, struct db *db, int64_t seq,
                                        int64_t change_seq, int64_t solution, bool cached,
                                        struct ischia_error *err)
 {
+    const int64_t now_ms = store_now_ms(store);
     struct query query;
     query_begin(&query, db, SQL_SUCCEED);
     query_put_integer(&query, solution);
     query_put_integer(&query, cached);
-    query_put_integer(&query, store_now_ms(store));
+    if (cached)
+        query_put_integer(&query, now_ms);
+    else
+        query_put_text(&query, NULL);
+    query_put_integer(&query, now_ms);
     query_put_integer(&query, change_seq);
     query_put_integer(&query, seq);
     return query_run(&query, err);

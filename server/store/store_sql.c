@@ -46,8 +46,9 @@ const struct sql_text sql_text[SQL_COUNT] = {
     [SQL_ACCEPT] =
         {.sqlite =
              "INSERT INTO assessment (seq, id, state, priority, cached, change_seq, created_ms, "
-             "finished_ms, solution, case_key, subject, side, label, measured_at, case_json, "
-             "warnings_json) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"},
+             "started_ms, finished_ms, solution, case_key, subject, side, label, measured_at, "
+             "case_json, warnings_json) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
+             "?)"},
     [SQL_STATE] =
         {.sqlite =
              "SELECT seq, state, attempt, case_key, crashes, solution FROM assessment WHERE id "
@@ -73,8 +74,9 @@ const struct sql_text sql_text[SQL_COUNT] = {
              "UPDATE assessment SET state = 0, crashes = crashes + ?, change_seq = ? WHERE seq "
              "= ?"},
     [SQL_SUCCEED] =
-        {.sqlite = "UPDATE assessment SET state = 2, solution = ?, cached = ?, finished_ms = ?, "
-                   "change_seq = ? WHERE seq = ?"},
+        {.sqlite =
+             "UPDATE assessment SET state = 2, solution = ?, cached = ?, started_ms = coalesce(?, "
+             "started_ms), finished_ms = ?, change_seq = ? WHERE seq = ?"},
     [SQL_FAIL] =
         {.sqlite =
              "UPDATE assessment SET state = 3, problem_json = ?, finished_ms = ?, change_seq = "

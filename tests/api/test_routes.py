@@ -85,6 +85,8 @@ class Routes(unittest.TestCase):
         second = self.service.submit(F=203.5, subject='B')
         self.assertFalse(first['cached'])
         self.assertTrue(second['cached'])
+        self.assertEqual(second['started_at'], second['finished_at'])
+        self.assertIsNotNone(second['started_at'])
         self.assertNotEqual(first['id'], second['id'])
         self.assertEqual(first['result'], second['result'])
 
