@@ -56,9 +56,16 @@ export const report_path = (id: string): string =>
   `${assessment_path(id)}/report?lang=${language()}`;
 export const document_path = assessment_path;
 
+/* A number of the skin or of the model, which the form leaves at its default. */
+export interface ModelOption {
+  group: 'skin' | 'model';
+  key: string;
+  default: number;
+}
+
 interface ParametersDocument {
   parameters: ParameterInfo[];
-  options?: { group: string; key: string; default: number }[];
+  options?: ModelOption[];
   resolutions?: { name: string }[];
 }
 
@@ -66,6 +73,7 @@ export interface Parameters {
   inputs: ParameterInfo[];
   skin_thickness_mm: number; /* the default one */
   resolutions: string[];
+  options: ModelOption[];
 }
 
 export async function get_parameters(): Promise<Parameters> {
@@ -75,6 +83,7 @@ export async function get_parameters(): Promise<Parameters> {
     inputs: document.parameters,
     skin_thickness_mm: skin?.default ?? 0,
     resolutions: document.resolutions?.map((r) => r.name) ?? [],
+    options: document.options ?? [],
   };
 }
 

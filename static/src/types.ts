@@ -153,7 +153,8 @@ export interface Assessment {
   measured_at?: string | null;
   resolution?: string;
   sd?: 'typical' | Record<string, number> | null;
-  skin?: { mu: number; thickness: number } | null;
+  skin?: Record<string, number> | null;
+  model?: Record<string, number | string> | null; /* its name, and its options by key */
   parameters: Record<string, number>;
   progress: number;
   result?: Result | null;

@@ -360,3 +360,50 @@ test('an earlier assessment can be changed and computed again', async () => {
   assert.equal(await page.inputValue('#subject'), 'again-1');
   assert.equal(await page.inputValue('#left-R1'), '');
 });
+
+/* Opens the form as "Change and compute again" does, with assessments that never were computed. */
+async function again(...bodies) {
+  const ids = bodies.map(([side, body]) => {
+    const numbers = Object.entries(sample[side]).map(([key, text]) => [key, Number(text)]);
+    return s.daemon.add({ ...Object.fromEntries(numbers), side, ...body }).id;
+  });
+  await page.goto(`${s.origin}/?from=${ids.join(',')}`);
+  const [[side]] = bodies;
+  await page.waitForFunction((at) => document.querySelector(`#${at}-R1`)?.value, side);
+}
+
+test('what belongs to an earlier assessment comes with its numbers', async () => {
+  const body = { subject: 'again-2', resolution: 'fine', measured_at: '2026-01-10T09:30:00Z' };
+  await again(
+    ['left', { ...body, sd: { R1: 0.5, R2: 0, F: 20 } }],
+    ['right', { ...body, sd: { R1: 0.5, R2: 0, F: 20 } }],
+  );
+  assert.equal(await page.inputValue('#right-R1'), '6.9');
+  assert.equal(await page.inputValue('#measured_at'), '2026-01-10');
+  assert.equal(await page.inputValue('#sd'), 'own');
+  assert.equal(await page.inputValue('#sd-R1'), '0.5');
+  assert.equal(await page.inputValue('#sd-R2'), '');
+  assert.equal(await page.locator('.left-behind').count(), 0);
+  await submit_and_wait(page, 2);
+  const [sent] = s.daemon.bodies.slice(-1);
+  assert.equal(sent.resolution, 'fine');
+  assert.deepEqual(sent.sd, { R1: 0.5, F: 20 });
+});
+
+test('what the form has no place for is said not to be taken over', async () => {
+  await again(['left', { skin: { mu: 50 }, label: 'before the cushion' }]);
+  const said = () => page.locator('.left-behind').innerText();
+  assert.match(await said(), /Not taken over from the earlier assessment: its skin .*, its label/);
+  await assert_accessible(page, 'the form with an earlier assessment');
+  await page.click('text=Clear');
+  assert.equal(await page.locator('.left-behind').count(), 0);
+});
+
+test('two assessments that are no pair never stand in one form', async () => {
+  for (const second of ['left', 'right']) {
+    await again(['left', { subject: 'again-A' }], [second, { subject: 'again-B', R1: 8 }]);
+    assert.equal(await page.inputValue('#subject'), 'again-A');
+    assert.equal(await page.inputValue('#left-R1'), '7.1');
+    assert.equal(await page.inputValue('#right-R1'), '');
+  }
+});

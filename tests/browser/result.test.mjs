@@ -199,6 +199,32 @@ test('history of the same subject, and the list, its filter and its comparison',
   await assert_accessible(page, 'a comparison');
 });
 
+test('two that are no pair are changed one by one', async () => {
+  const ids = [];
+  for (const [subject, side] of [
+    ['A-1', 'left'],
+    ['B-1', 'left'],
+    ['B-2', 'right'],
+  ]) {
+    await compute(subject, [side]);
+    await all_ended(1);
+    ids.push([...s.daemon.documents.keys()].slice(-1)[0]);
+  }
+  for (const other of [ids[1], ids[2]]) {
+    await page.goto(`${s.origin}/assessments/${ids[0]}?with=${other}`);
+    await all_ended(2);
+    const links = page.getByRole('link', { name: 'Change and compute again' });
+    assert.deepEqual(await links.evaluateAll((all) => all.map((a) => new URL(a.href).search)), [
+      `?from=${ids[0]}`,
+      `?from=${other}`,
+    ]);
+    await assert_accessible(page, 'a comparison of two persons');
+  }
+  await page.getByRole('link', { name: 'compute again · Right' }).click();
+  await page.waitForFunction(() => document.querySelector('#right-R1')?.value === '6.9');
+  assert.equal(await page.inputValue('#subject'), 'B-2');
+});
+
 test('the list pages through what is older', async () => {
   for (let i = 0; i < 55; i++)
     s.daemon.add({

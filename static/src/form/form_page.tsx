@@ -4,9 +4,11 @@
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { get_parameters, type Parameters } from '../api.js';
 import { use_emulator } from '../emulator.js';
-import { language, t } from '../i18n.js';
-import type { Side } from '../types.js';
+import { language, t, t_or } from '../i18n.js';
+import type { Assessment, Side } from '../types.js';
+import { Shape } from '../ui.js';
 import { Deviations, DeviationFields } from './deviations.js';
+import { left_behind } from './earlier.js';
 import { field_id } from './field.js';
 import { sides } from './model.js';
 import { PersonFields } from './person.js';
@@ -74,6 +76,21 @@ function Loading(props: { failed: boolean; again: () => void }) {
   );
 }
 
+/* What the earlier assessment had and this form has no place for. */
+function LeftBehind(props: { earlier: Assessment[]; parameters: Parameters }) {
+  const names = left_behind(props.earlier, props.parameters.options);
+  if (names.length === 0) return null;
+  const list = names.map((name) => t_or(`form.earlier.${name}`, name)).join(', ');
+  return (
+    <p class="left-behind">
+      <span class="reading warning">
+        <Shape of="shear" />
+        <span>{t('form.earlier', { list })}</span>
+      </span>
+    </p>
+  );
+}
+
 function submit_label(filled: Side[]): string {
   if (filled.length === 2) return t('form.submit.both');
   return filled[0] ? t(`form.submit.${filled[0]}`) : t('form.submit.none');
@@ -93,6 +110,7 @@ export function FormPage(props: { from: string[] }) {
     <form class="assessment" onSubmit={send} noValidate>
       <h1 tabIndex={-1}>{t('form.title')}</h1>
       <PersonFields person={person} on_change={form.set_person} on_sample={form.fill_sample} />
+      <LeftBehind earlier={form.earlier} parameters={parameters} />
       {failure && <Errors failure={failure} />}
       <div class="sides">
         {sides.map((side) => (

@@ -22,6 +22,17 @@ export interface Person {
   sd_text: Record<string, string>; /* of "own", by input */
 }
 
+export type Entries = Record<Side, SideEntry>;
+
+export const nobody: Person = {
+  subject: '',
+  measured_at: '',
+  broken_date: false,
+  resolution: 'standard',
+  sd: 'none',
+  sd_text: {},
+};
+
 export interface Finding {
   severity: 'fault' | 'warning';
   text: string;

@@ -8,22 +8,24 @@ import { navigate, result_address } from '../router.js';
 import type { Assessment, ParameterInfo, Side } from '../types.js';
 import { announce } from '../ui.js';
 import { sd_id } from './deviations.js';
+import { entries_of, fits_one_form, person_of } from './earlier.js';
 import {
   empty_side,
   sd_is_good,
   faults,
   is_empty,
+  nobody,
   server_faults,
   sides,
   subject_is_valid,
   submission,
+  type Entries,
   type Finding,
   type Person,
   type SideEntry,
 } from './model.js';
 import type { SamplePerson } from './sample.js';
 
-type Entries = Record<Side, SideEntry>;
 type Refused = Record<Side, Map<string, Finding>>;
 
 export interface Failure {
@@ -31,14 +33,6 @@ export interface Failure {
   fields: { side: Side; key: string; text: string }[];
 }
 
-const nobody: Person = {
-  subject: '',
-  measured_at: '',
-  broken_date: false,
-  resolution: 'standard',
-  sd: 'none',
-  sd_text: {},
-};
 const nothing = (): Entries => ({ left: empty_side(), right: empty_side() });
 const no_refusals = (): Refused => ({ left: new Map(), right: new Map() });
 const other: Record<Side, Side> = { left: 'right', right: 'left' };
@@ -58,16 +52,6 @@ function failure_of_fields(refused: Refused): Failure {
   return { text: t('form.error.title'), fields };
 }
 
-/* The numbers of earlier assessments as texts to be changed; a side nobody named takes a free one. */
-function entries_of(documents: Assessment[]): Entries {
-  const entries = nothing();
-  documents.forEach((d, i) => {
-    const text = Object.entries(d.parameters).map(([key, value]) => [key, String(value)]);
-    entries[d.side ?? sides[i] ?? 'left'].text = Object.fromEntries(text);
-  });
-  return entries;
-}
-
 /* Sends sides one after the other; the same content always under the same key, so that neither a
  * second click nor a retry makes a second assessment. */
 function use_sender(): (body: ReturnType<typeof submission>) => Promise<string> {
@@ -81,6 +65,7 @@ function use_sender(): (body: ReturnType<typeof submission>) => Promise<string> 
 }
 
 export function use_form(parameters: Parameters | null, from: string[]) {
+  const [earlier, set_earlier] = useState<Assessment[]>([]);
   const [person, set_person] = useState<Person>(nobody);
   const [entries, set_entries] = useState<Entries>(nothing);
   const [refused, set_refused] = useState<Refused>(no_refusals);
@@ -89,18 +74,24 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   const send_side = use_sender();
   const filled = sides.filter((side) => !is_empty(entries[side]));
 
-  const restart = (next: Entries, next_person: Person): void => {
+  const restart = (next: Entries, next_person: Person, next_earlier: Assessment[] = []): void => {
     set_entries(next);
     set_person(next_person);
+    set_earlier(next_earlier);
     set_refused(no_refusals());
     set_failure(null);
+  };
+
+  /* Of two that do not fit into one form the first. */
+  const start_from = (documents: Assessment[]): void => {
+    const used = fits_one_form(documents) ? documents : documents.slice(0, 1);
+    if (used[0]) restart(entries_of(used), person_of(used[0]), used);
   };
 
   useEffect(() => {
     if (from.length === 0) return;
     Promise.all(from.map(get_assessment)).then(
-      (documents) =>
-        restart(entries_of(documents), { ...nobody, subject: documents[0]?.subject ?? '' }),
+      start_from,
       () => undefined /* erased since: the form stays empty */,
     );
   }, [from.join()]);
@@ -177,6 +168,7 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   };
 
   return {
+    earlier,
     person,
     entries,
     refused,

@@ -12,6 +12,7 @@ import {
   type Parameters,
 } from '../api.js';
 import { use_emulator } from '../emulator.js';
+import { fits_one_form, is_pair } from '../form/earlier.js';
 import { Follower, has_ended, type Followed } from '../follow.js';
 import { format_time, language, t, t_or } from '../i18n.js';
 import { form_address } from '../router.js';
@@ -73,6 +74,7 @@ function SideCard(props: {
   state: Followed;
   name: string;
   skin_mm: number;
+  alone: boolean; /* it cannot be changed together with the other one */
   on_cancelled: () => void;
 }) {
   const { state, name } = props;
@@ -98,6 +100,11 @@ function SideCard(props: {
       {busy && <Running state={state} name={name} on_cancelled={props.on_cancelled} />}
       {document && has_ended(document) && !done && <NoResult of={document} />}
       {done && <Glance of={done} skin_mm={props.skin_mm} />}
+      {props.alone && done && (
+        <p class="again">
+          <Again ids={[done.id]} of={name} />
+        </p>
+      )}
     </section>
   );
 }
@@ -169,11 +176,20 @@ function Files(props: { documents: Assessment[]; names: string[] }) {
   );
 }
 
+/* To the form with these numbers; `of`: whose they are, where there are several such links. */
+function Again(props: { ids: string[]; of?: string }) {
+  return (
+    <Link to={form_address(props.ids)} class="button">
+      {t('result.again')}
+      {props.of && <span class="visually-hidden">{` · ${props.of}`}</span>}
+    </Link>
+  );
+}
+
 function page_title(documents: Assessment[]): string {
   const [a, b] = documents;
   if (!a || !b) return t('result.title');
-  const pair = a.side && b.side && a.side !== b.side && a.subject === b.subject;
-  return t(pair ? 'result.title.pair' : 'result.title.compare');
+  return t(is_pair(documents) ? 'result.title.pair' : 'result.title.compare');
 }
 
 export function ResultPage(props: { ids: string[] }) {
@@ -190,6 +206,7 @@ export function ResultPage(props: { ids: string[] }) {
   use_announcement(complete ? states : [], names);
   const emulator = use_emulator();
   const done = finished(documents);
+  const together = fits_one_form(documents);
   const inputs = parameters?.inputs ?? [];
   return (
     <div class="result">
@@ -197,9 +214,7 @@ export function ResultPage(props: { ids: string[] }) {
         <h1 tabIndex={-1}>{page_title(documents)}</h1>
         {done.length > 0 && (
           <div class="actions">
-            <Link to={form_address(ids)} class="button">
-              {t('result.again')}
-            </Link>
+            {together && <Again ids={documents.map((d) => d.id)} />}
             <button type="button" class="primary" onClick={() => window.print()}>
               {t('result.print')}
             </button>
@@ -214,6 +229,7 @@ export function ResultPage(props: { ids: string[] }) {
             state={state}
             name={names[i] ?? ''}
             skin_mm={parameters?.skin_thickness_mm ?? 0}
+            alone={complete && !together}
             on_cancelled={() => refresh(i)}
           />
         ))}
