@@ -104,6 +104,21 @@ test('swapped radii are noticed and swapped back with one click', async () => {
   assert.equal(await text_of('left', 'R2').then((t) => /Smaller/.test(t)), false);
 });
 
+test('stiffness is copied to the other side, and what is empty erases nothing', async () => {
+  const copy = (side) => page.locator(`fieldset.${side} .beside > .quiet`);
+  await fill_side(page, 'left', { muM: '7', muF: '' });
+  await fill_side(page, 'right', { muM: '3', muF: '4' });
+  await copy('left').click();
+  assert.equal(await page.inputValue('#right-muM'), '7');
+  assert.equal(await page.inputValue('#right-muF'), '4');
+  await page.click('text=Clear');
+  await fill_side(page, 'right');
+  await copy('left').click();
+  assert.equal(await page.inputValue('#right-muM'), '8');
+  await page.selectOption('.language select', 'fr');
+  assert.match(await copy('left').innerText(), /vers l’autre côté/);
+});
+
 test('total thickness gives eM, and says how', async () => {
   await fill_side(page, 'left');
   await page.getByLabel(/total thickness of muscle and fat instead of eM, Left/).check();

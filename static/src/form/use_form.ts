@@ -107,7 +107,9 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   };
 
   const copy_stiffness = (side: Side): void => {
-    const copied = Object.fromEntries(stiffness.map((key) => [key, entries[side].text[key] ?? '']));
+    const from = entries[side].text;
+    const filled_in = stiffness.filter((key) => from[key]?.trim());
+    const copied = Object.fromEntries(filled_in.map((key) => [key, from[key] ?? '']));
     const to = other[side];
     set_entries((now) => ({ ...now, [to]: { ...now[to], text: { ...now[to].text, ...copied } } }));
   };
