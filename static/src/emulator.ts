@@ -16,21 +16,32 @@ export function use_emulator(): boolean {
   return there;
 }
 
-/* The answer to the latest question; null while there is none, and after a refusal. A question that
- * is overtaken is given up. `wait_ms`: how long the question must stand before it is asked. */
+export interface Answer<T> {
+  is: T | null; /* to the latest question or, while that is on its way, to the one before */
+  stale: boolean; /* to the one before: not to be taken for an answer */
+  failed: boolean; /* the latest question got none */
+}
+
+const no_answer = { is: null, stale: false, failed: false };
+
+/* What is known of the latest question; a null one has no answer. A question that is overtaken is
+ * given up. `wait_ms`: how long the question must stand before it is asked. */
 export function use_answer<T>(
   question: string | null,
   ask: (signal: AbortSignal) => Promise<T>,
   wait_ms: number,
-): T | null {
-  const [answer, set] = useState<{ to: string; is: T } | null>(null);
+): Answer<T> {
+  const [answer, set] = useState<{ to: string; is: T | null } | null>(null);
   useEffect(() => {
-    if (question === null) return undefined;
+    if (question === null) {
+      set(null);
+      return undefined;
+    }
     const gone = new AbortController();
     const timer = setTimeout(() => {
       ask(gone.signal).then(
         (is) => !gone.signal.aborted && set({ to: question, is }),
-        () => !gone.signal.aborted && set(null),
+        () => !gone.signal.aborted && set({ to: question, is: null }),
       );
     }, wait_ms);
     return () => {
@@ -38,5 +49,7 @@ export function use_answer<T>(
       gone.abort();
     };
   }, [question]);
-  return question === null ? null : (answer?.is ?? null);
+  if (question === null || !answer) return no_answer;
+  const { to, is } = answer;
+  return { is, stale: to !== question && is !== null, failed: to === question && is === null };
 }

@@ -83,6 +83,30 @@ test('a slow answer never replaces a later one', async () => {
   assert.match(await preview('left'), /1\.25/);
 });
 
+test('an estimate of other numbers than those on screen is marked, and none is kept', async () => {
+  let release;
+  const held = new Promise((resolve) => (release = resolve));
+  await page.route('**/v1/estimates', async (route) => {
+    const { F } = JSON.parse(route.request().postData());
+    if (F === 300) await held;
+    return F === 400 ? route.abort() : route.continue().catch(() => undefined);
+  });
+  const stale = page.locator('fieldset.left .preview [aria-busy=true]');
+  await fill_side(page, 'left', { ...sample.left, F: '200', muM: '5' });
+  await says('left', '1.10');
+  assert.equal(await stale.count(), 0);
+  await page.fill('#left-F', '300');
+  await stale.waitFor();
+  assert.match(await stale.innerText(), /1\.10/);
+  assert.ok(Number(await stale.evaluate((e) => getComputedStyle(e).opacity)) < 1);
+  release();
+  await says('left', '1.25');
+  assert.equal(await stale.count(), 0);
+  await page.fill('#left-F', '400');
+  await says('left', 'No estimate at the moment');
+  assert.doesNotMatch(await preview('left'), /1\.25|Seven numbers/);
+});
+
 test('without an emulator the form has no preview', async () => {
   s.daemon.emulator = null;
   await page.reload();
@@ -182,4 +206,26 @@ test('what if: a force that keeps the muscle below, and curves of every input', 
   await box.getByText('muM, kPa').first().waitFor();
   await box.getByText('In numbers').click();
   assert.ok((await box.locator('tbody tr').count()) >= 10);
+});
+
+test('what if: curves of another input than the chosen one are marked, and none is kept', async () => {
+  await compute('P-7', ['left']);
+  const box = page.locator('details.what-if');
+  await box.locator('summary').first().click();
+  await box.locator('svg').first().waitFor();
+  let release;
+  const held = new Promise((resolve) => (release = resolve));
+  await page.route('**/what-if?parameter=eM', async (route) => {
+    await held;
+    return route.continue();
+  });
+  await page.route('**/what-if?parameter=eF', (route) => route.abort());
+  await box.locator('select').selectOption('eM');
+  await box.locator('[aria-busy=true]', { hasText: 'F, N' }).waitFor();
+  release();
+  await box.getByText('eM, mm').first().waitFor();
+  assert.equal(await box.locator('[aria-busy=true]').count(), 0);
+  await box.locator('select').selectOption('eF');
+  await box.getByText('No estimate at the moment').waitFor();
+  assert.equal(await box.locator('svg').count(), 0);
 });

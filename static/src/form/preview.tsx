@@ -67,13 +67,18 @@ const outside = (e: Estimate): string =>
 export function Preview(props: { entry: SideEntry; inputs: ParameterInfo[]; side: string }) {
   const side = whole_side(props.entry, props.inputs);
   const question = side && JSON.stringify(side);
-  const e = use_answer(question, (signal) => estimate(side ?? {}, signal), WAIT_MS);
+  const answer = use_answer(question, (signal) => estimate(side ?? {}, signal), WAIT_MS);
+  const { is: e, stale, failed } = answer;
   return (
     <section class="preview" aria-label={`${t('form.preview.title')} · ${props.side}`}>
       <p class="title">{t('form.preview.title')}</p>
-      {!e && <p class="hint">{t('form.preview.waiting')}</p>}
-      {e && e.strain && <Rows of={e} />}
-      {e && !e.strain && <p>{t('form.preview.outside', { keys: outside(e) })}</p>}
+      {!question && <p class="hint">{t('form.preview.waiting')}</p>}
+      {failed && <p>{t('form.preview.failed')}</p>}
+      {e && (
+        <div class={stale ? 'stale' : ''} aria-busy={stale}>
+          {e.strain ? <Rows of={e} /> : <p>{t('form.preview.outside', { keys: outside(e) })}</p>}
+        </div>
+      )}
       {e?.emulator.trial && <p class="trial">{t('uncertain.trial')}</p>}
       {e && e.strain && <p class="hint">{t('form.preview.note')}</p>}
     </section>

@@ -193,7 +193,7 @@ function Panel(props: { of: Finished; inputs: ParameterInfo[]; side: string }) {
   const [input, choose] = useState('F');
   const body = question_of(props.of);
   const question = input + JSON.stringify(body);
-  const answer = use_answer(question, (signal) => what_if(body, input, signal), 0);
+  const { is, stale, failed } = use_answer(question, (signal) => what_if(body, input, signal), 0);
   const id = `what-if-${props.of.id}`;
   return (
     <>
@@ -207,7 +207,12 @@ function Panel(props: { of: Finished; inputs: ParameterInfo[]; side: string }) {
           ))}
         </select>
       </p>
-      {answer && <Curves of={answer} measured={props.of.parameters[answer.parameter] ?? NaN} />}
+      {failed && <p>{t('form.preview.failed')}</p>}
+      {is && (
+        <div class={stale ? 'stale' : ''} aria-busy={stale}>
+          <Curves of={is} measured={props.of.parameters[is.parameter] ?? NaN} />
+        </div>
+      )}
     </>
   );
 }
