@@ -147,6 +147,72 @@ test('sending faults lists them all, links to the fields and sends nothing', asy
   assert.equal(s.daemon.documents.size, before_count);
 });
 
+test('the list of faults shrinks with each correction, and goes with the last', async () => {
+  await fill_side(page, 'left', { ...sample.left, R1: '', eM: '80', muM: '', muF: '' });
+  await fill_side(page, 'right');
+  await page.click('button[type=submit]');
+  const left = () => page.locator('.errors li a').allInnerTexts();
+  assert.deepEqual(await left(), ['Left, R1', 'Left, eM', 'Left, muM', 'Left, muF']);
+  await page.fill('#left-R1', '7.1');
+  assert.deepEqual(await left(), ['Left, eM', 'Left, muM', 'Left, muF']);
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'left-R1');
+  await page.locator('fieldset.right .beside > .quiet').click();
+  assert.deepEqual(await left(), ['Left, eM']);
+  assert.equal(await page.getAttribute('#left-muM', 'aria-invalid'), 'false');
+  await page.fill('#left-eM', '31');
+  assert.equal(await page.locator('.errors').count(), 0);
+  await page.click('text=Clear');
+  await page.click('button[type=submit]');
+  assert.equal(await page.locator('.errors').count(), 1);
+  await page.fill('#right-F', '200');
+  assert.equal(await page.locator('.errors').count(), 0);
+});
+
+test('a fault goes when another number takes it away', async () => {
+  await fill_side(page, 'left', { ...sample.left, R1: '14', R2: '9' });
+  await page.click('button[type=submit]');
+  assert.equal(await page.locator('.errors li').count(), 1);
+  await page.fill('#left-R1', '8');
+  assert.equal(await page.locator('.errors').count(), 0);
+  assert.equal(await page.getAttribute('#left-R2', 'aria-invalid'), 'false');
+});
+
+test('faults are told in the language that the page changes to', async () => {
+  await fill_side(page, 'left', { ...sample.left, R1: '99', F: '' });
+  await page.click('button[type=submit]');
+  await page.selectOption('.language select', 'fr');
+  const box = await page.locator('.errors').innerText();
+  assert.match(box, /À corriger\s?:/);
+  assert.match(box, /Gauche, R1\s?: .*15 mm/);
+  assert.doesNotMatch(box, /Above|missing|correct:/);
+  assert.doesNotMatch(await text_of('left', 'R1'), /Above/);
+  assert.doesNotMatch(await text_of('left', 'F'), /missing/);
+});
+
+test('what the server refuses of neither side leads to its own field', async () => {
+  await fill_side(page, 'right');
+  await page.fill('#subject', 'odd-subject');
+  await page.click('button[type=submit]');
+  await page.locator('.errors').getByRole('link', { name: 'Subject code' }).click();
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'subject');
+  await page.fill('#subject', 'odd-sd');
+  assert.equal(await page.locator('.errors').count(), 0);
+  await page.selectOption('#sd', 'own');
+  await page.fill('#sd-eM', '2');
+  await page.click('button[type=submit]');
+  const link = page.locator('.errors').getByRole('link', { name: 'Uncertainty, eM' });
+  await link.waitFor();
+  assert.equal(await page.getAttribute('#sd-eM', 'aria-invalid'), 'true');
+  assert.match(await page.locator('#sd-note').innerText(), /eM: .*refused by the server/);
+  assert.equal(await page.getAttribute('#right-eM', 'aria-invalid'), 'false');
+  await assert_accessible(page, 'the form with a refused standard deviation');
+  await link.click();
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'sd-eM');
+  await page.fill('#sd-eM', '3');
+  assert.equal(await page.locator('.errors').count(), 0);
+  assert.equal(await page.getAttribute('#sd-eM', 'aria-invalid'), 'false');
+});
+
 test('an empty form is not sent', async () => {
   await page.click('button[type=submit]');
   assert.match(await page.locator('.errors').innerText(), /at least one side/);

@@ -298,7 +298,7 @@ function faults_of(body) {
   }
   if (body.subject?.startsWith('odd')) {
     errors.push({
-      pointer: '/muM',
+      pointer: { 'odd-sd': '/sd/eM', 'odd-subject': '/subject' }[body.subject] ?? '/muM',
       code: 'out_of_range',
       detail: 'muM is refused by the server alone',
     });

@@ -144,6 +144,8 @@ test('what is no standard deviation is not sent', async () => {
   const before_ = s.daemon.bodies.length;
   await fill_side(page, 'left');
   await page.selectOption('#sd', 'own');
+  await page.fill('#sd-R2', '100000');
+  assert.match(await page.locator('#sd-note').innerText(), /R2: Above 112 mm: not accepted/);
   await page.fill('#sd-R2', '-1');
   assert.equal(await page.getAttribute('#sd-R2', 'aria-invalid'), 'true');
   await page.click('button[type=submit]');

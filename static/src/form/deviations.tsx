@@ -6,7 +6,7 @@ import { format, t } from '../i18n.js';
 import type { ParameterInfo } from '../types.js';
 import { Shape } from '../ui.js';
 import { Symbol_ } from './field.js';
-import { sd_is_good, type Person } from './model.js';
+import { in_words, lang_of, sd_fault, type Finding, type Person } from './model.js';
 
 export const sd_id = (key: string): string => `sd-${key}`;
 
@@ -36,16 +36,41 @@ function typical(info: ParameterInfo): string {
   return relative > 0 ? `${format(100 * relative)}\u202f%` : format(absolute);
 }
 
+/* The first that is wrong, by its name; else what to type. */
+function Note(props: { found: Map<string, Finding> }) {
+  const [first] = props.found;
+  if (!first) {
+    return (
+      <span id="sd-note" class="hint">
+        {t('form.sd.hint')}
+      </span>
+    );
+  }
+  const [key, { says }] = first;
+  return (
+    <span id="sd-note" class="reading fault">
+      <Shape of="none" />
+      <span lang={lang_of(says)}>{`${key}: ${in_words(says)}`}</span>
+    </span>
+  );
+}
+
 export function DeviationFields(props: {
   person: Person;
   inputs: ParameterInfo[];
+  refused: Map<string, Finding>; /* shown until the field is changed */
   on_change: (person: Person) => void;
 }) {
-  const { person, inputs, on_change } = props;
+  const { person, inputs, refused, on_change } = props;
   if (person.sd !== 'own') return null;
   const set = (key: string, text: string): void =>
     on_change({ ...person, sd_text: { ...person.sd_text, [key]: text } });
-  const bad = inputs.some(({ key }) => !sd_is_good(person.sd_text[key] ?? ''));
+  const found = new Map(
+    inputs.flatMap((info): [string, Finding][] => {
+      const f = refused.get(info.key) ?? sd_fault(person.sd_text[info.key] ?? '', info);
+      return f ? [[info.key, f]] : [];
+    }),
+  );
   return (
     <fieldset class="deviations">
       <legend>{t('form.sd.title')}</legend>
@@ -63,7 +88,7 @@ export function DeviationFields(props: {
               autoComplete="off"
               placeholder={typical(info)}
               value={text}
-              aria-invalid={!sd_is_good(text)}
+              aria-invalid={found.has(key)}
               aria-describedby="sd-note"
               onInput={(e) => set(key, e.currentTarget.value)}
             />
@@ -71,10 +96,7 @@ export function DeviationFields(props: {
           </label>
         );
       })}
-      <span id="sd-note" class={bad ? 'reading fault' : 'hint'}>
-        {bad && <Shape of="none" />}
-        {t(bad ? 'form.sd.fault' : 'form.sd.hint')}
-      </span>
+      <Note found={found} />
     </fieldset>
   );
 }

@@ -6,7 +6,7 @@ import { useState } from 'preact/hooks';
 import { format, t } from '../i18n.js';
 import { Shape } from '../ui.js';
 import type { ParameterInfo, Side } from '../types.js';
-import type { Finding } from './model.js';
+import { in_words, lang_of, type Finding } from './model.js';
 
 export interface FieldProps {
   side: Side;
@@ -76,7 +76,7 @@ function Reading(props: FieldProps & { id: string }) {
         <span class="visually-hidden">
           {`${t(finding.severity === 'fault' ? 'fault.word' : 'warning.word')}: `}
         </span>
-        <span>{finding.text}</span>
+        <span lang={lang_of(finding.says)}>{in_words(finding.says)}</span>
         {props.action}
       </span>
     );

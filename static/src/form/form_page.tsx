@@ -9,9 +9,9 @@ import type { Assessment, Side } from '../types.js';
 import { Shape } from '../ui.js';
 import { Deviations, DeviationFields } from './deviations.js';
 import { left_behind } from './earlier.js';
-import { field_id } from './field.js';
-import { sides } from './model.js';
+import { in_words, lang_of, sides } from './model.js';
 import { PersonFields } from './person.js';
+import { id_of, listed, name_of, type Refusal, type Refused } from './refusal.js';
 import { Resolution } from './resolution.js';
 import { SideForm } from './side_form.js';
 import { use_form, type Failure } from './use_form.js';
@@ -21,28 +21,38 @@ function focus_field(e: Event, id: string): void {
   document.getElementById(id)?.focus();
 }
 
-function Errors(props: { failure: Failure }) {
+function Refusals(props: { of: Refusal[] }) {
+  return (
+    <ul>
+      {props.of.map((refusal) => {
+        const { group, key, finding } = refusal;
+        const [id, name] = [id_of(refusal), name_of(refusal)];
+        return (
+          <li key={group + key}>
+            {id && (
+              <a href={`#${id}`} onClick={(e) => focus_field(e, id)}>
+                {name}
+              </a>
+            )}
+            {id ? ': ' : `${name}: `}
+            <span lang={lang_of(finding.says)}>{in_words(finding.says)}</span>
+          </li>
+        );
+      })}
+    </ul>
+  );
+}
+
+/* Takes the focus when it appears, and when the form was sent again; not while it is corrected. */
+function Errors(props: { failure: Failure; refused: Refused }) {
   const box = useRef<HTMLDivElement>(null);
-  const { text, fields } = props.failure;
+  const { key, values } = props.failure;
+  const refusals = listed(props.refused);
   useEffect(() => box.current?.focus(), [props.failure]);
   return (
     <div class="errors" role="alert" tabIndex={-1} ref={box}>
-      <p>{text}</p>
-      {fields.length > 0 && (
-        <ul>
-          {fields.map(({ side, key, text: fault }) => (
-            <li key={side + key}>
-              <a
-                href={`#${field_id(side, key)}`}
-                onClick={(e) => focus_field(e, field_id(side, key))}
-              >
-                {`${t(`side.${side}`)}, ${key}`}
-              </a>
-              {`: ${fault}`}
-            </li>
-          ))}
-        </ul>
-      )}
+      <p>{t(key, values)}</p>
+      {refusals.length > 0 && <Refusals of={refusals} />}
     </div>
   );
 }
@@ -109,9 +119,9 @@ export function FormPage(props: { from: string[] }) {
   return (
     <form class="assessment" onSubmit={send} noValidate>
       <h1 tabIndex={-1}>{t('form.title')}</h1>
-      <PersonFields person={person} on_change={form.set_person} on_sample={form.fill_sample} />
+      <PersonFields person={person} on_change={form.change_person} on_sample={form.fill_sample} />
       <LeftBehind earlier={form.earlier} parameters={parameters} />
-      {failure && <Errors failure={failure} />}
+      {failure && <Errors failure={failure} refused={form.refused} />}
       <div class="sides">
         {sides.map((side) => (
           <SideForm
@@ -120,13 +130,18 @@ export function FormPage(props: { from: string[] }) {
             entry={entries[side]}
             parameters={parameters}
             refused={form.refused[side]}
-            on_change={(entry, key) => form.change_side(side, entry, key)}
+            on_change={(entry) => form.change_side(side, entry)}
             on_copy={() => form.copy_stiffness(side)}
             preview={previews}
           />
         ))}
       </div>
-      <DeviationFields person={person} inputs={parameters.inputs} on_change={form.set_person} />
+      <DeviationFields
+        person={person}
+        inputs={parameters.inputs}
+        refused={form.refused.sd}
+        on_change={form.change_person}
+      />
       <div class="submit">
         <button type="submit" class="primary" aria-disabled={sending}>
           {sending ? t('form.submitting') : submit_label(form.filled)}
@@ -138,9 +153,9 @@ export function FormPage(props: { from: string[] }) {
         <Resolution
           names={parameters.resolutions}
           value={person.resolution}
-          change={(resolution) => form.set_person({ ...person, resolution })}
+          change={(resolution) => form.change_person({ ...person, resolution })}
         />
-        <Deviations person={person} on_change={form.set_person} />
+        <Deviations person={person} on_change={form.change_person} />
       </div>
     </form>
   );

@@ -2,10 +2,10 @@
 //
 // What the form knows, apart from how it looks: the texts as typed, what they mean, what is wrong
 // with them, and the documents to send. Limits come from the daemon, never from here.
-import { t } from '../i18n.js';
+import { t, type Key, type Values } from '../i18n.js';
 import { difference, parse_number, type Parsed } from '../number.js';
 import type { Submission } from '../api.js';
-import type { FieldError, ParameterInfo, Side } from '../types.js';
+import type { ParameterInfo, Side } from '../types.js';
 
 export interface SideEntry {
   text: Record<string, string>;
@@ -33,11 +33,26 @@ export const nobody: Person = {
   sd_text: {},
 };
 
+/* Words of this page, in whatever language it is in when they are shown; or the daemon's own. */
+export type Said = { key: Key; values?: Values } | { text: string; lang: string };
+
+export const in_words = (said: Said): string =>
+  'key' in said ? t(said.key, said.values) : said.text;
+
+/* The language of the daemon's own words; those of the page need no mark. */
+export const lang_of = (said: Said): string | undefined => ('key' in said ? undefined : said.lang);
+
 export interface Finding {
   severity: 'fault' | 'warning';
-  text: string;
   code: string;
+  says: Said;
 }
+
+const fault = (code: string, key: Key, values: Values = {}): Finding => ({
+  severity: 'fault',
+  code,
+  says: { key, values },
+});
 
 export const sides: readonly Side[] = ['left', 'right'];
 
@@ -66,13 +81,13 @@ function range_finding(value: number, info: ParameterInfo, typing: boolean): Fin
   if (value < accepted.min) {
     /* 1 may be on its way to 10: say so only when the field is left. */
     if (typing && value >= 0) return null;
-    return { severity: 'fault', code: 'low', text: t('fault.low', { min: accepted.min, unit }) };
+    return fault('low', 'fault.low', { min: accepted.min, unit });
   }
   if (value > accepted.max) {
-    return { severity: 'fault', code: 'high', text: t('fault.high', { max: accepted.max, unit }) };
+    return fault('high', 'fault.high', { max: accepted.max, unit });
   }
   if (value < studied.min || value > studied.max) {
-    return { severity: 'warning', code: 'studied', text: t('fault.studied') };
+    return { severity: 'warning', code: 'studied', says: { key: 'fault.studied' } };
   }
   return null;
 }
@@ -82,16 +97,16 @@ export function finding(entry: SideEntry, info: ParameterInfo, typing: boolean):
   const p = parsed(entry, info.key);
   if (p.kind === 'empty') return null;
   if (p.kind === 'ambiguous') {
-    return { severity: 'fault', code: 'ambiguous', text: t('fault.ambiguous') };
+    return fault('ambiguous', 'fault.ambiguous');
   }
   if (p.kind === 'not_a_number') {
-    return { severity: 'fault', code: 'not_a_number', text: t('fault.not_a_number') };
+    return fault('not_a_number', 'fault.not_a_number');
   }
   const range = range_finding(p.value, info, typing);
   if (range?.severity === 'fault') return range;
   const R1 = value_of(entry, 'R1');
   if (info.key === 'R2' && !typing && R1 !== null && p.value < R1) {
-    return { severity: 'fault', code: 'inconsistent', text: t('fault.R2_small') };
+    return fault('inconsistent', 'fault.R2_small');
   }
   return range;
 }
@@ -103,29 +118,22 @@ export function faults(entry: SideEntry, inputs: ParameterInfo[]): Map<string, F
     const f = finding(entry, info, false);
     if (f?.severity === 'fault') found.set(info.key, f);
     else if (parsed(entry, info.key).kind === 'empty') {
-      found.set(info.key, { severity: 'fault', code: 'missing', text: t('fault.missing') });
+      found.set(info.key, fault('missing', 'fault.missing'));
     }
   }
   return found;
 }
 
-/* The daemon's own findings, by key; what belongs to no field is kept under ''. */
-export function server_faults(errors: FieldError[]): Map<string, Finding> {
-  return new Map(
-    errors.map((e) => [
-      e.pointer.replace(/^\//, ''),
-      { severity: 'fault', code: e.code, text: e.detail } as Finding,
-    ]),
-  );
-}
-
 export const subject_is_valid = (subject: string): boolean =>
   subject === '' || /^[A-Za-z0-9._-]{1,64}$/.test(subject);
 
-/* What was typed that is no standard deviation; '' is one: the input is known exactly. */
-export function sd_is_good(text: string): boolean {
+/* What is wrong with a standard deviation; nothing with '': the input is known exactly. */
+export function sd_fault(text: string, info: ParameterInfo): Finding | null {
   const p = parse_number(text);
-  return p.kind === 'empty' || (p.kind === 'number' && p.value >= 0);
+  if (p.kind === 'empty') return null;
+  if (p.kind !== 'number' || p.value < 0) return fault('not_a_number', 'form.sd.fault');
+  const max = info.sd?.max ?? Infinity;
+  return p.value > max ? fault('high', 'fault.high', { max, unit: info.unit }) : null;
 }
 
 function own_sd(person: Person): Record<string, number> {

@@ -15,7 +15,7 @@ export interface SideFormProps {
   entry: SideEntry;
   parameters: Parameters;
   refused: Map<string, Finding>; /* shown until the field is changed */
-  on_change: (entry: SideEntry, key: string) => void;
+  on_change: (entry: SideEntry) => void;
   on_copy: () => void;
   preview: boolean; /* there is an emulator to ask */
 }
@@ -38,8 +38,8 @@ export function SideForm(props: SideFormProps) {
   const name = t(`side.${side}`);
 
   const set_text = (key: string, text: string): void => {
-    if (key === 'eM' && entry.by_total) props.on_change({ ...entry, total: text }, key);
-    else props.on_change({ ...entry, text: { ...entry.text, [key]: text } }, key);
+    if (key === 'eM' && entry.by_total) props.on_change({ ...entry, total: text });
+    else props.on_change({ ...entry, text: { ...entry.text, [key]: text } });
   };
 
   const total_toggle = (
@@ -48,14 +48,14 @@ export function SideForm(props: SideFormProps) {
         type="checkbox"
         checked={entry.by_total}
         aria-label={t('form.total.label', { side: name })}
-        onChange={(e) => props.on_change({ ...entry, by_total: e.currentTarget.checked }, 'eM')}
+        onChange={(e) => props.on_change({ ...entry, by_total: e.currentTarget.checked })}
       />
       {t('form.total')}
     </label>
   );
 
   const swap_button = (
-    <button type="button" class="inline" onClick={() => props.on_change(swapped(entry), 'R2')}>
+    <button type="button" class="inline" onClick={() => props.on_change(swapped(entry))}>
       {t('fault.swap')}
     </button>
   );

@@ -3,53 +3,51 @@
 // The state of the form and what can be done with it.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { ApiError, get_assessment, new_idempotency_key, submit, type Parameters } from '../api.js';
-import { t } from '../i18n.js';
+import { t, type Key, type Values } from '../i18n.js';
 import { navigate, result_address } from '../router.js';
-import type { Assessment, ParameterInfo, Side } from '../types.js';
+import type { Assessment, Side } from '../types.js';
 import { announce } from '../ui.js';
 import { sd_id } from './deviations.js';
 import { entries_of, fits_one_form, person_of } from './earlier.js';
 import {
   empty_side,
-  sd_is_good,
   faults,
   is_empty,
   nobody,
-  server_faults,
+  sd_fault,
   sides,
   subject_is_valid,
   submission,
   type Entries,
-  type Finding,
   type Person,
   type SideEntry,
 } from './model.js';
+import {
+  left_of_person,
+  left_of_side,
+  listed,
+  no_refusals,
+  refused_by_daemon,
+  type Refused,
+} from './refusal.js';
 import type { SamplePerson } from './sample.js';
 
-type Refused = Record<Side, Map<string, Finding>>;
-
+/* Why the form was not sent, or not taken. `until`: what takes it away. */
 export interface Failure {
-  text: string;
-  fields: { side: Side; key: string; text: string }[];
+  key: Key;
+  values?: Values;
+  until: 'corrected' | 'filled' | 'sent';
 }
 
 const nothing = (): Entries => ({ left: empty_side(), right: empty_side() });
-const no_refusals = (): Refused => ({ left: new Map(), right: new Map() });
 const other: Record<Side, Side> = { left: 'right', right: 'left' };
 const stiffness = ['muM', 'muF'];
 
 function failure_of(e: ApiError): Failure {
-  const busy = e.status === 429 || e.status === 503;
-  if (busy) return { text: t('form.error.busy'), fields: [] };
-  if (e.status === 0 || e.status >= 502) return { text: t('form.error.unreachable'), fields: [] };
-  return { text: t('form.error.server', { detail: e.message }), fields: [] };
-}
-
-function failure_of_fields(refused: Refused): Failure {
-  const fields = sides.flatMap((side) =>
-    [...refused[side]].map(([key, f]) => ({ side, key, text: f.text })),
-  );
-  return { text: t('form.error.title'), fields };
+  const until = 'sent';
+  if (e.status === 429 || e.status === 503) return { key: 'form.error.busy', until };
+  if (e.status === 0 || e.status >= 502) return { key: 'form.error.unreachable', until };
+  return { key: 'form.error.server', values: { detail: e.message }, until };
 }
 
 /* Sends sides one after the other; the same content always under the same key, so that neither a
@@ -72,7 +70,13 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   const [failure, set_failure] = useState<Failure | null>(null);
   const [sending, set_sending] = useState(false);
   const send_side = use_sender();
+  const inputs = parameters?.inputs ?? [];
   const filled = sides.filter((side) => !is_empty(entries[side]));
+  const is_over = {
+    corrected: listed(refused).length === 0,
+    filled: filled.length > 0,
+    sent: false,
+  };
 
   const restart = (next: Entries, next_person: Person, next_earlier: Assessment[] = []): void => {
     set_entries(next);
@@ -96,14 +100,15 @@ export function use_form(parameters: Parameters | null, from: string[]) {
     );
   }, [from.join()]);
 
-  const change_side = (side: Side, entry: SideEntry, key: string): void => {
+  const change_side = (side: Side, entry: SideEntry): void => {
+    const before = entries[side];
     set_entries((now) => ({ ...now, [side]: entry }));
-    set_refused((now) => {
-      const rest = new Map(now[side]);
-      rest.delete(key);
-      if (key === 'R2') rest.delete('R1'); /* swapped together */
-      return { ...now, [side]: rest };
-    });
+    set_refused((now) => ({ ...now, [side]: left_of_side(now[side], before, entry, inputs) }));
+  };
+
+  const change_person = (next: Person): void => {
+    set_person(next);
+    set_refused((now) => left_of_person(now, person, next));
   };
 
   const copy_stiffness = (side: Side): void => {
@@ -111,7 +116,7 @@ export function use_form(parameters: Parameters | null, from: string[]) {
     const filled_in = stiffness.filter((key) => from[key]?.trim());
     const copied = Object.fromEntries(filled_in.map((key) => [key, from[key] ?? '']));
     const to = other[side];
-    set_entries((now) => ({ ...now, [to]: { ...now[to], text: { ...now[to].text, ...copied } } }));
+    change_side(to, { ...entries[to], text: { ...entries[to].text, ...copied } });
   };
 
   const fill_sample = (sample: SamplePerson): void => {
@@ -122,17 +127,18 @@ export function use_form(parameters: Parameters | null, from: string[]) {
 
   const refuse = (found: Refused): void => {
     set_refused(found);
-    set_failure(failure_of_fields(found));
+    set_failure({ key: 'form.error.title', until: 'corrected' });
   };
 
   /* True when nothing is wrong that can be seen from here. */
-  const check = (inputs: ParameterInfo[]): boolean => {
+  const check = (): boolean => {
     const bad_sd =
-      person.sd === 'own' && inputs.find(({ key }) => !sd_is_good(person.sd_text[key] ?? ''))?.key;
+      person.sd === 'own' &&
+      inputs.find((info) => sd_fault(person.sd_text[info.key] ?? '', info))?.key;
     const found = no_refusals();
     for (const side of filled) found[side] = faults(entries[side], inputs);
-    if (filled.length === 0) set_failure({ text: t('form.error.empty'), fields: [] });
-    else if (found.left.size + found.right.size > 0) refuse(found);
+    if (filled.length === 0) set_failure({ key: 'form.error.empty', until: 'filled' });
+    else if (listed(found).length > 0) refuse(found);
     else if (!subject_is_valid(person.subject)) document.getElementById('subject')?.focus();
     else if (person.broken_date) document.getElementById('measured_at')?.focus();
     else if (bad_sd) document.getElementById(sd_id(bad_sd))?.focus();
@@ -143,11 +149,11 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   const explain = (e: unknown, side: Side): void => {
     if (!(e instanceof ApiError)) throw e;
     const { errors } = e.problem;
-    if (errors?.length) refuse({ ...no_refusals(), [side]: server_faults(errors) });
+    if (errors?.length) refuse(refused_by_daemon(errors, side, inputs));
     else set_failure(failure_of(e));
   };
 
-  const send_all = async (inputs: ParameterInfo[]): Promise<string[] | null> => {
+  const send_all = async (): Promise<string[] | null> => {
     const ids: string[] = [];
     for (const side of filled) {
       try {
@@ -163,9 +169,10 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   const send = async (): Promise<void> => {
     if (!parameters || sending) return;
     set_failure(null);
-    if (!check(parameters.inputs)) return;
+    set_refused(no_refusals());
+    if (!check()) return;
     set_sending(true);
-    const ids = await send_all(parameters.inputs).finally(() => set_sending(false));
+    const ids = await send_all().finally(() => set_sending(false));
     if (ids) navigate(result_address(ids));
   };
 
@@ -174,10 +181,10 @@ export function use_form(parameters: Parameters | null, from: string[]) {
     person,
     entries,
     refused,
-    failure,
+    failure: failure && !is_over[failure.until] ? failure : null,
     sending,
     filled,
-    set_person,
+    change_person,
     change_side,
     copy_stiffness,
     fill_sample,
