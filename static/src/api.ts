@@ -141,6 +141,9 @@ export interface Page {
   next_cursor: string | null;
 }
 
+/* The daemon's largest. */
+const csv_page_size = 500;
+
 export interface Filter {
   subject?: string;
   side?: string;
@@ -162,7 +165,15 @@ export async function list(filter: Filter): Promise<Page> {
   return { items: page.items, next_cursor: page.next_cursor ?? null };
 }
 
-/* The same list as a table for a spreadsheet, up to the daemon's largest page. */
+/* The same list, all of it, as a table for a spreadsheet: page by page, its header once. */
 export async function list_as_csv(filter: Filter): Promise<Blob> {
-  return (await ask(list_path({ ...filter, limit: 500 }), 'text/csv')).blob();
+  const pages: string[] = [];
+  let cursor = '';
+  do {
+    const response = await ask(list_path({ ...filter, cursor, limit: csv_page_size }), 'text/csv');
+    const text = await response.text();
+    pages.push(cursor ? text.slice(text.indexOf('\n') + 1) : text);
+    cursor = response.headers.get('X-Next-Cursor') ?? '';
+  } while (cursor);
+  return new Blob(pages, { type: 'text/csv;charset=utf-8' });
 }

@@ -430,7 +430,7 @@ export class StandIn {
     }
     if (url.pathname === '/v1/assessments' && request.method === 'POST')
       return this.create(request, response);
-    if (url.pathname === '/v1/assessments') return this.list(url, response);
+    if (url.pathname === '/v1/assessments') return this.list(url, request, response);
     if (id) return this.one(id, part, response);
     return this.file(url.pathname, tag, response);
   }
@@ -496,7 +496,7 @@ export class StandIn {
     return document;
   }
 
-  list(url, response) {
+  list(url, request, response) {
     const wanted = (d) =>
       ['subject', 'side', 'status'].every(
         (k) => !url.searchParams.get(k) || d[k] === url.searchParams.get(k),
@@ -506,6 +506,15 @@ export class StandIn {
     const limit = Number(url.searchParams.get('limit') ?? 50);
     const items = all.slice(start, start + limit);
     const next = start + limit < all.length ? String(start + limit) : null;
+    if (request.headers.accept.includes('text/csv')) {
+      response.writeHead(200, {
+        'Content-Type': 'text/csv; charset=utf-8; header=present',
+        ...(next ? { 'X-Next-Cursor': next } : {}),
+      });
+      return response.end(
+        ['id,subject', ...items.map((d) => `${d.id},${d.subject}`), ''].join('\n'),
+      );
+    }
     this.json(response, 200, { items, next_cursor: next });
   }
 

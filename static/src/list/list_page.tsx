@@ -29,12 +29,16 @@ function use_page(query: URLSearchParams): UsedPage {
   const [page, set_page] = useState<Page | null>(null);
   const [fault, set_fault] = useState<string | null>(null);
   useEffect(() => {
+    let overtaken = false;
     set_page(null);
     set_fault(null);
     list({ ...filter_of(query), cursor: query.get('cursor') ?? '', limit: page_size }).then(
-      set_page,
-      (e: unknown) => set_fault(fault_text(e)),
+      (answer) => !overtaken && set_page(answer),
+      (e: unknown) => !overtaken && set_fault(fault_text(e)),
     );
+    return () => {
+      overtaken = true;
+    };
   }, [query.toString()]);
   return [page, fault, (e) => set_fault(fault_text(e))];
 }
@@ -44,8 +48,18 @@ function address(query: URLSearchParams): string {
   return kept.length ? `${list_address}?${new URLSearchParams(kept)}` : list_address;
 }
 
+/* One choice of a select; `chosen` is what the address says. */
+function Choice(props: { value: string; chosen: string | null; children: string }) {
+  return (
+    <option value={props.value} selected={props.value === (props.chosen ?? '')}>
+      {props.children}
+    </option>
+  );
+}
+
 function FilterForm(props: { query: URLSearchParams }) {
   const { query } = props;
+  const [side, status] = [query.get('side'), query.get('status')];
   const apply = (e: SubmitEvent): void => {
     e.preventDefault();
     const entries = [...new FormData(e.currentTarget as HTMLFormElement)];
@@ -65,20 +79,28 @@ function FilterForm(props: { query: URLSearchParams }) {
       </div>
       <div class="item">
         <label for="f-side">{t('list.side')}</label>
-        <select id="f-side" name="side" defaultValue={query.get('side') ?? ''}>
-          <option value="">{t('list.any')}</option>
-          <option value="left">{t('side.left')}</option>
-          <option value="right">{t('side.right')}</option>
+        <select id="f-side" name="side">
+          <Choice value="" chosen={side}>
+            {t('list.any')}
+          </Choice>
+          <Choice value="left" chosen={side}>
+            {t('side.left')}
+          </Choice>
+          <Choice value="right" chosen={side}>
+            {t('side.right')}
+          </Choice>
         </select>
       </div>
       <div class="item">
         <label for="f-status">{t('list.status')}</label>
-        <select id="f-status" name="status" defaultValue={query.get('status') ?? ''}>
-          <option value="">{t('list.any')}</option>
+        <select id="f-status" name="status">
+          <Choice value="" chosen={status}>
+            {t('list.any')}
+          </Choice>
           {statuses.map((s) => (
-            <option key={s} value={s}>
+            <Choice key={s} value={s} chosen={status}>
               {t(`status.${s}`)}
-            </option>
+            </Choice>
           ))}
         </select>
       </div>
@@ -182,6 +204,7 @@ function Pager(props: { query: URLSearchParams; page: Page }) {
 export function ListPage(props: { query: URLSearchParams }) {
   const [page, fault, fail] = use_page(props.query);
   const [selected, set_selected] = useState<string[]>([]);
+  useEffect(() => set_selected([]), [props.query.toString()]); /* rows that are not shown */
   const toggle = (id: string): void =>
     set_selected((now) =>
       now.includes(id) ? now.filter((s) => s !== id) : [...now, id].slice(0, 2),
