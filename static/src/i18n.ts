@@ -48,7 +48,7 @@ export function set_language(next: Language): void {
   document.documentElement.lang = next;
   const address = new URL(window.location.href);
   address.searchParams.delete('lang'); /* what is chosen now holds, also after a reload */
-  if (asked() !== null) history.replaceState(null, '', address);
+  if (asked() !== null) history.replaceState(history.state, '', address);
   try {
     localStorage.setItem(storage_key, next);
   } catch {

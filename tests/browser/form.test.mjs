@@ -488,3 +488,30 @@ test('two assessments that are no pair never stand in one form', async () => {
     assert.equal(await page.inputValue('#right-R1'), '');
   }
 });
+
+test('Back finds the form as it was left, and a new one is empty', async () => {
+  const is = async (subject, R1) => {
+    await page.waitForFunction((text) => document.querySelector('#left-R1')?.value === text, R1);
+    assert.equal(await page.inputValue('#subject'), subject);
+  };
+  await fill_side(page, 'left');
+  await page.fill('#subject', 'back-1');
+  await page.click('text=Past assessments');
+  await page.locator('h1', { hasText: 'Past assessments' }).waitFor();
+  await page.goBack();
+  await is('back-1', '7.1');
+  await submit_and_wait(page, 1);
+  await page.click('text=Change and compute again');
+  await is('back-1', '7.1');
+  await page.fill('#left-R1', '8');
+  await page.click('text=Past assessments');
+  await page.locator('h1', { hasText: 'Past assessments' }).waitFor();
+  await page.goBack();
+  await is('back-1', '8');
+  await page.goBack();
+  await page.goBack();
+  await is('back-1', '7.1');
+  await page.click('text=Past assessments');
+  await page.click('text=New assessment');
+  await is('', '');
+});

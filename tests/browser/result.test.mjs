@@ -91,8 +91,10 @@ test('progress is followed, and cancel stops it', async () => {
   /* The words follow the bar with the next event. */
   await page.locator('.running', { hasText: /load step \d+, iteration 3/ }).waitFor();
   await assert_accessible(page, 'a running assessment');
-  await page.click('text=Cancel');
+  await page.getByRole('button', { name: 'Cancel' }).focus();
+  await page.keyboard.press('Enter');
   await page.locator('.no-result').waitFor();
+  assert.equal(await page.evaluate(() => document.activeElement.innerText), 'Left');
   assert.match(await page.locator('.no-result').innerText(), /Cancelled/);
   await assert_accessible(page, 'a cancelled assessment');
 });
@@ -105,6 +107,9 @@ test('a failed solve shows the reason and no number', async () => {
   assert.match(text, /last converged force is 143\.2 N/);
   assert.equal(await page.locator('.curve, .caveats, .report').count(), 0);
   await assert_accessible(page, 'a failed assessment');
+  assert.equal(await page.getByRole('button', { name: 'Print report' }).count(), 0);
+  await page.click('text=Change and compute again');
+  await page.waitForFunction(() => document.querySelector('#left-R1')?.value === '7.1');
 });
 
 test('a load path that ended is told in the language of the page', async () => {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The state of the form and what can be done with it.
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { ApiError, get_assessment, new_idempotency_key, submit, type Parameters } from '../api.js';
 import { t, type Key, type Values } from '../i18n.js';
 import { navigate, result_address } from '../router.js';
 import type { Assessment, Side } from '../types.js';
 import { announce } from '../ui.js';
 import { sd_id } from './deviations.js';
+import { draft_here, keep_draft } from './draft.js';
 import { entries_of, fits_one_form, person_of } from './earlier.js';
 import {
   empty_side,
@@ -63,9 +64,11 @@ function use_sender(): (body: ReturnType<typeof submission>) => Promise<string> 
 }
 
 export function use_form(parameters: Parameters | null, from: string[]) {
-  const [earlier, set_earlier] = useState<Assessment[]>([]);
-  const [person, set_person] = useState<Person>(nobody);
-  const [entries, set_entries] = useState<Entries>(nothing);
+  const [draft] = useState(draft_here);
+  const [loading, set_loading] = useState(!draft && from.length > 0);
+  const [earlier, set_earlier] = useState<Assessment[]>(draft?.earlier ?? []);
+  const [person, set_person] = useState<Person>(draft?.person ?? nobody);
+  const [entries, set_entries] = useState<Entries>(draft?.entries ?? nothing);
   const [refused, set_refused] = useState<Refused>(no_refusals);
   const [failure, set_failure] = useState<Failure | null>(null);
   const [sending, set_sending] = useState(false);
@@ -93,12 +96,16 @@ export function use_form(parameters: Parameters | null, from: string[]) {
   };
 
   useEffect(() => {
-    if (from.length === 0) return;
-    Promise.all(from.map(get_assessment)).then(
-      start_from,
-      () => undefined /* erased since: the form stays empty */,
-    );
+    if (!loading) return;
+    Promise.all(from.map(get_assessment))
+      .then(start_from, () => undefined /* erased since: the form stays empty */)
+      .finally(() => set_loading(false));
   }, [from.join()]);
+
+  /* After every change, and when the same form stands at another address. */
+  useLayoutEffect(() => {
+    if (!loading) keep_draft({ person, entries, earlier });
+  });
 
   const change_side = (side: Side, entry: SideEntry): void => {
     const before = entries[side];

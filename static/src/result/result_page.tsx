@@ -84,7 +84,7 @@ function SideCard(props: {
   return (
     <section class={`card ${document?.side ?? ''}`} aria-label={name}>
       <header>
-        <h2>{name}</h2>
+        <h2 tabIndex={-1}>{name}</h2>
         {document && <Meta of={document} />}
       </header>
       {lost && (
@@ -100,9 +100,9 @@ function SideCard(props: {
       {busy && <Running state={state} name={name} on_cancelled={props.on_cancelled} />}
       {document && has_ended(document) && !done && <NoResult of={document} />}
       {done && <Glance of={done} skin_mm={props.skin_mm} />}
-      {props.alone && done && (
+      {props.alone && document && has_ended(document) && (
         <p class="again">
-          <Again ids={[done.id]} of={name} />
+          <Again ids={[document.id]} of={name} />
         </p>
       )}
     </section>
@@ -212,13 +212,17 @@ export function ResultPage(props: { ids: string[] }) {
     <div class="result">
       <div class="title-row">
         <h1 tabIndex={-1}>{page_title(documents)}</h1>
-        {done.length > 0 && (
+        {documents.some(has_ended) && (
           <div class="actions">
             {together && <Again ids={documents.map((d) => d.id)} />}
-            <button type="button" class="primary" onClick={() => window.print()}>
-              {t('result.print')}
-            </button>
-            <Files documents={done} names={column_names(done)} />
+            {done.length > 0 && (
+              <>
+                <button type="button" class="primary" onClick={() => window.print()}>
+                  {t('result.print')}
+                </button>
+                <Files documents={done} names={column_names(done)} />
+              </>
+            )}
           </div>
         )}
       </div>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // A side that has no result, yet or ever: where it stands, why it ended.
+import { useLayoutEffect, useRef } from 'preact/hooks';
 import { cancel } from '../api.js';
 import { format, t } from '../i18n.js';
 import type { Followed } from '../follow.js';
@@ -19,6 +20,15 @@ function progress_text(state: Followed): string {
 export function Running(props: { state: Followed; name: string; on_cancelled: () => void }) {
   const { state, name } = props;
   const { document } = state;
+  const button = useRef<HTMLButtonElement>(null);
+  /* The button goes with the computation: who stands on it goes on at the heading of its card. */
+  useLayoutEffect(
+    () => () => {
+      const gone = button.current;
+      if (gone?.matches(':focus')) gone.closest('section')?.querySelector('h2')?.focus();
+    },
+    [],
+  );
   if (!document) return <p class="loading">{t('result.loading')}</p>;
   const fraction = state.progress?.fraction ?? document.progress;
   /* When the daemon cannot be reached the follower already says so. */
@@ -27,7 +37,7 @@ export function Running(props: { state: Followed; name: string; on_cancelled: ()
     <div class="running">
       <p>{progress_text(state)}</p>
       <progress max={1} value={fraction} aria-label={t('result.progress', { side: name })} />
-      <button type="button" onClick={stop}>
+      <button type="button" ref={button} onClick={stop}>
         {t('result.cancel')}
       </button>
     </div>
