@@ -2,7 +2,7 @@
 //
 // The one place that talks to the daemon. Every address is a path: nothing but the daemon that
 // served the page is ever asked.
-import { language } from './i18n.js';
+import { language, type Key } from './i18n.js';
 import type { Assessment, Estimate, ParameterInfo, Problem, WhatIf } from './types.js';
 
 /* What went wrong with a request: the daemon's own problem document, or status 0 when it could
@@ -17,6 +17,14 @@ export class ApiError extends Error {
     this.problem = problem;
   }
 }
+
+const no_access: Partial<Record<number, Key>> = {
+  401: 'app.sign_in',
+  403: 'app.no_access',
+};
+
+/* For those who are not let in: the daemon's own words are for programs, and speak of tokens. */
+export const access_key = (e: ApiError): Key | undefined => no_access[e.status];
 
 async function problem_of(response: Response): Promise<Problem> {
   try {

@@ -270,6 +270,25 @@ test('a full queue loses nothing', async () => {
   assert.equal(await page.inputValue('#left-R1'), '7.1');
 });
 
+test('who is not let in is told so in words of people, and loses nothing', async () => {
+  const cases = { 'unknown-1': /not signed in.*Nothing .* lost/, 'forbidden-1': /access.*Nothing/ };
+  await fill_side(page, 'left');
+  for (const [subject, expected] of Object.entries(cases)) {
+    await page.fill('#subject', subject);
+    await page.click('button[type=submit]');
+    await page.locator('.errors', { hasText: expected }).waitFor();
+    assert.doesNotMatch(await page.locator('.errors').innerText(), /token/i);
+    assert.equal(await page.inputValue('#left-R1'), '7.1');
+  }
+  const refuse = (route) => route.fulfill({ status: 401, json: { detail: 'Send a token' } });
+  await page.route('**/v1/assessments?*', refuse);
+  await page.route('**/v1/assessments/*', refuse);
+  for (const address of ['/assessments', '/assessments/0192f0c1']) {
+    await page.goto(`${s.origin}${address}`);
+    await page.locator('.errors', { hasText: 'You are not signed in' }).waitFor();
+  }
+});
+
 test('sending again what was sent makes no second assessment', async () => {
   let dropped = false;
   await page.route('**/v1/assessments', async (route) => {

@@ -450,6 +450,11 @@ export class StandIn {
         )
       : JSON.parse(text);
     this.bodies.push(body);
+    const refused = { 'unknown-1': 401, 'forbidden-1': 403 }[body.subject];
+    if (refused) {
+      const detail = 'Send a token: `Authorization: Bearer TOKEN`.';
+      return this.json(response, refused, { title: 'No access', status: refused, detail });
+    }
     if (body.subject?.startsWith('busy')) {
       return this.json(response, 429, { title: 'Queue full', status: 429 }, { 'Retry-After': '1' });
     }

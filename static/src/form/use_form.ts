@@ -2,7 +2,14 @@
 //
 // The state of the form and what can be done with it.
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
-import { ApiError, get_assessment, new_idempotency_key, submit, type Parameters } from '../api.js';
+import {
+  access_key,
+  ApiError,
+  get_assessment,
+  new_idempotency_key,
+  submit,
+  type Parameters,
+} from '../api.js';
 import { t, type Key, type Values } from '../i18n.js';
 import { navigate, result_address } from '../router.js';
 import type { Assessment, Side } from '../types.js';
@@ -48,6 +55,8 @@ function failure_of(e: ApiError): Failure {
   const until = 'sent';
   if (e.status === 429 || e.status === 503) return { key: 'form.error.busy', until };
   if (e.status === 0 || e.status >= 502) return { key: 'form.error.unreachable', until };
+  const access = access_key(e);
+  if (access) return { key: access, until };
   return { key: 'form.error.server', values: { detail: e.message }, until };
 }
 

@@ -3,7 +3,7 @@
 // Past assessments: filtered, newest first, two of them selectable for comparison. The filter
 // stands in the address, so a list can be kept as a bookmark.
 import { useEffect, useState } from 'preact/hooks';
-import { ApiError, list, list_as_csv, type Filter, type Page } from '../api.js';
+import { access_key, ApiError, list, list_as_csv, type Filter, type Page } from '../api.js';
 import { format, format_fixed, format_time, t } from '../i18n.js';
 import { list_address, navigate, result_address } from '../router.js';
 import type { Assessment } from '../types.js';
@@ -20,7 +20,8 @@ function filter_of(query: URLSearchParams): Filter {
 
 function fault_text(e: unknown): string {
   if (!(e instanceof ApiError)) throw e;
-  return e.status === 0 ? t('form.error.unreachable') : t('list.error', { detail: e.message });
+  const key = e.status === 0 ? 'form.error.unreachable' : access_key(e);
+  return key ? t(key) : t('list.error', { detail: e.message });
 }
 
 type UsedPage = [Page | null, string | null, (e: unknown) => void];

@@ -4,6 +4,8 @@
 import type { ComponentChildren } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import {
+  access_key,
+  type ApiError,
   document_path,
   field_path,
   get_parameters,
@@ -70,6 +72,11 @@ function use_announcement(states: Followed[], names: string[]): void {
   }, [states]);
 }
 
+function error_text(e: ApiError): string {
+  const key = e.status === 404 ? 'result.not_found' : access_key(e);
+  return key ? t(key) : e.message;
+}
+
 function SideCard(props: {
   state: Followed;
   name: string;
@@ -94,7 +101,7 @@ function SideCard(props: {
       )}
       {error && (
         <p class="errors" role="alert">
-          {error.status === 404 ? t('result.not_found') : error.message}
+          {error_text(error)}
         </p>
       )}
       {busy && <Running state={state} name={name} on_cancelled={props.on_cancelled} />}
