@@ -145,13 +145,17 @@ static void put_other_faults(const struct form *form)
     }
 }
 
-static void put_label(const struct form *form, const char *key, const char *label)
+/* A label and the beginning of its control, up to the value of the last attribute. */
+static void put_label(const struct form *form, const char *control, const char *key,
+                      const char *label)
 {
     page_put(form->out, "<p><label for=\"");
     page_escape(form->out, key);
     page_put(form->out, "\">");
     page_escape(form->out, label);
-    page_put(form->out, "</label>\n<input id=\"");
+    page_put(form->out, "</label>\n<");
+    page_put(form->out, control);
+    page_put(form->out, " id=\"");
     page_escape(form->out, key);
     page_put(form->out, "\" name=\"");
     page_escape(form->out, key);
@@ -182,7 +186,7 @@ static void put_parameter(const struct form *form, const struct ischia_param_inf
                            word_text("key", info->key), word_text("unit", info->unit),
                            word_number("min", info->accepted_min, 6),
                            word_number("max", info->accepted_max, 6)));
-    put_label(form, info->key, label);
+    put_label(form, "input", info->key, label);
     page_put(form->out, "\" inputmode=\"decimal\" required autocomplete=\"off\" title=\"");
     page_word(form->out, form->language, words->help);
     put_value(form, info->key);
@@ -201,9 +205,8 @@ static void put_choices(const struct form *form, const char *key, enum word labe
 {
     char sent[16];
     sent_value(form, key, sent, sizeof sent);
-    page_format(form->out, "<p><label for=\"%s\">", key);
-    page_word(form->out, form->language, label);
-    page_format(form->out, "</label>\n<select id=\"%s\" name=\"%s\">\n", key, key);
+    put_label(form, "select", key, words_get(form->language, label));
+    page_put(form->out, "\">\n");
     for (size_t i = 0; i < count; i++) {
         page_put(form->out, "<option value=\"");
         page_put(form->out, choices[i].value);
@@ -248,10 +251,10 @@ static void put_form(const struct form *form)
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
         put_parameter(form, &ischia_params[i], &param_words[i]);
     put_sides(form);
-    put_label(form, "subject", words_get(language, WORD_DAEMON_FORM_SUBJECT));
+    put_label(form, "input", "subject", words_get(language, WORD_DAEMON_FORM_SUBJECT));
     page_put(form->out, "\" maxlength=\"64\" autocomplete=\"off");
     put_value(form, "subject");
-    put_label(form, "measured_at", words_get(language, WORD_DAEMON_FORM_MEASURED_AT));
+    put_label(form, "input", "measured_at", words_get(language, WORD_DAEMON_FORM_MEASURED_AT));
     page_put(form->out, "\" autocomplete=\"off");
     put_value(form, "measured_at");
     put_deviations(form);

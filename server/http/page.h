@@ -17,7 +17,7 @@
 void page_put(struct text_out *out, const char *html);
 /* Adds text with the characters that mean something in HTML escaped. */
 void page_escape(struct text_out *out, const char *text);
-/* The same, printf-style; cut after 1 KiB. */
+/* The same, printf-style: markup in the format is escaped too. Cut after 1 KiB. */
 __attribute__((format(printf, 2, 3))) void page_format(struct text_out *out, const char *format,
                                                        ...);
 /* Adds a word, escaped. */

@@ -232,7 +232,7 @@ class Routes(unittest.TestCase):
         answer = self.service.ask(
             'POST',
             '/v1/assessments',
-            b'R1=99&subject=%3Cb%3E',
+            b'R1=99&subject=%3Cb%3E&side=right&sd=typical',
             {
                 'Content-Type': 'application/x-www-form-urlencoded',
                 'Accept': 'text/html,application/xhtml+xml,*/*;q=0.8',
@@ -243,6 +243,10 @@ class Routes(unittest.TestCase):
         self.assertIn('R1 is 99 mm; accepted 3 to 15 mm', page)
         self.assertIn('value="&lt;b&gt;"', page)
         self.assertNotIn('<b>', page)
+        self.assertNotRegex(page, '&lt;(p|label|select)')
+        for key, value in {'side': 'right', 'sd': 'typical'}.items():
+            select = re.search(f'<select id="{key}" name="{key}">(.*?)</select>', page, re.S)
+            self.assertEqual(re.findall('value="([^"]*)" selected', select[1]), [value])
 
     def test_a_full_queue_is_429(self):
         with Service('--queue-limit', '2') as service:
