@@ -14,6 +14,14 @@ const here = dirname(fileURLToPath(import.meta.url));
 const input = join(here, '../examples/table2.csv');
 const [ischia, out = join(here, 'reference/table2.json')] = process.argv.slice(2);
 const digits = 6; /* a plot needs no more, and another compiler then writes the same file */
+/* What the cohort is computed with, as nothing else is said: the defaults of GET /v1/parameters. */
+const computed_with = {
+  resolution: 'standard',
+  options: {
+    skin: { mu: 67, thickness: 1 },
+    model: { L_over_h: 2, bulk_ratio: 2000, friction: 0.4, R2_surface: 0, embed_over_R1: 1 },
+  },
+};
 const columns = ['eps_max', 'eps_max_error', 'volume_shear_mm3', 'volume_both_mm3'];
 
 function rows_of(csv) {
@@ -54,5 +62,5 @@ const sides = converged.map((row) => ({
   ...Object.fromEntries(columns.map((name) => [name, Number(Number(row[name]).toPrecision(digits))])),
 }));
 await mkdir(dirname(out), { recursive: true });
-await writeFile(out, `${JSON.stringify({ model, sides }, null, 2)}\n`);
+await writeFile(out, `${JSON.stringify({ model, ...computed_with, sides }, null, 2)}\n`);
 console.log(`${out}: ${sides.length} of ${rows.length} sides`);

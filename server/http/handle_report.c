@@ -453,8 +453,41 @@ static void put_notes(const struct report *r, const struct ischia_case *c)
     page_put(r->out, "</ul>\n</section>\n");
 }
 
-/* What made it, which assessment it is, when, and room for a name. */
-static void put_end(const struct report *r, bool with_signature)
+/* "skin.thickness 2 mm, model.friction 0": every option that has another value than the default. */
+static const char *list_options(const struct report *r, const struct ischia_case *c, char *text,
+                                size_t size)
+{
+    size_t used = 0;
+    text[0] = '\0';
+    for (int i = 0; i < ISCHIA_OPTION_COUNT && used < size; i++) {
+        const struct ischia_option_info *info = &ischia_options[i];
+        char number[WORDS_NUMBER_BYTES], unit[16];
+        if (c->option[i] == info->default_value) continue;
+        used += (size_t)snprintf(
+            text + used, size - used, "%s%s.%s %s%s", used > 0 ? ", " : "", info->group, info->key,
+            words_number(number, r->language, c->option[i], 6), case_spaced_unit(info->unit, unit));
+    }
+    return text;
+}
+
+/* The mesh, always; the options where they are not the default. */
+static void put_settings(const struct report *r, const struct ischia_case *c)
+{
+    static const enum word resolutions[ISCHIA_RESOLUTION_COUNT] = {
+        [ISCHIA_STANDARD] = WORD_FORM_RESOLUTION_STANDARD,
+        [ISCHIA_FINE] = WORD_FORM_RESOLUTION_FINE,
+        [ISCHIA_COARSE] = WORD_FORM_RESOLUTION_COARSE,
+    };
+    char list[320];
+    page_format(r->out, " \u00b7 %s: %s", say(r, WORD_FORM_RESOLUTION),
+                say(r, resolutions[c->resolution]));
+    if (list_options(r, c, list, sizeof list)[0] == '\0') return;
+    page_put(r->out, " \u00b7 ");
+    page_fill(r->out, r->language, WORD_RESULT_OPTIONS, WORDS(word_text("list", list)));
+}
+
+/* What made it and how, which assessment it is, when, and room for a name. */
+static void put_end(const struct report *r, const struct ischia_case *c, bool with_signature)
 {
     char id[UUID_TEXT_BYTES], created[DOCUMENTS_TIME_BYTES], finished[DOCUMENTS_TIME_BYTES];
     uuid_format(&r->row->id, id);
@@ -470,6 +503,7 @@ static void put_end(const struct report *r, bool with_signature)
         page_fill(r->out, r->language, WORD_DAEMON_REPORT_ENDED,
                   WORDS(word_text("time", finished)));
     }
+    put_settings(r, c);
     page_put(r->out, "</p>\n");
     if (with_signature) {
         page_put(r->out, "<p class=\"signature\">");
@@ -518,7 +552,7 @@ static enum ischia_code put_result(const struct report *r, const struct ischia_r
     TRY(put_uncertainty(r, err));
     if (!r->attached) put_figure(r);
     put_notes(r, &request->values);
-    put_end(r, true);
+    put_end(r, &request->values, true);
     return ISCHIA_OK;
 }
 
@@ -589,7 +623,7 @@ static enum ischia_code put_body(const struct report *r, struct ischia_error *er
     else
         put_waiting(r);
     put_inputs(r, &request);
-    put_end(r, false);
+    put_end(r, &request.values, false);
     return ISCHIA_OK;
 }
 

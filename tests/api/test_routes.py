@@ -6,6 +6,7 @@ import csv
 import gzip
 import io
 import json
+import os
 import re
 import threading
 import time
@@ -14,6 +15,7 @@ import urllib.parse
 
 from service import JSON, SIDE, Answer, Service, direct_only, eventually, side
 
+HERE = os.path.dirname(os.path.abspath(__file__))
 ABSENT = '/v1/assessments/01a201a9-49a6-75d9-8b79-1f36e7bd6914'
 
 
@@ -578,6 +580,29 @@ class Routes(unittest.TestCase):
             value = document['parameters'][parameter['key']]
             row = f'{parameter["name"]}</th><td>{parameter["key"]}</td><td class="n">{value:g}</td>'
             self.assertIn(f'{row}<td>{parameter["unit"]}</td>', page)
+
+    def test_the_report_says_how_it_was_computed(self):
+        usual = self.service.submit(F=332.5)['links']['self']
+        page = self.service.get(usual + '/report').body.decode()
+        self.assertIn('Resolution: Standard</p>', page)
+        other = self.service.submit(
+            F=332.5, resolution='coarse', skin={'thickness': 2.5}, model='as-published'
+        )['links']['self']
+        said = 'Resolution: Coarse (a quick look) \u00b7 not the default: skin.thickness 2.5 mm, model.bulk_ratio 100'
+        self.assertIn(said, self.service.get(other + '/report').body.decode())
+        german = self.service.get(other + '/report?lang=de').body.decode()
+        self.assertIn('nicht die Vorgabe: skin.thickness 2,5 mm', german)
+
+    def test_the_reference_sides_were_computed_with_the_defaults(self):
+        with open(os.path.join(HERE, '../../static/reference/table2.json'), encoding='utf-8') as f:
+            reference = json.load(f)
+        served = self.service.get('/v1/parameters').json()
+        defaults = {'skin': {}, 'model': {}}
+        for option in served['options']:
+            defaults[option['group']][option['key']] = option['default']
+        self.assertEqual(reference['options'], defaults)
+        usual = [r['name'] for r in served['resolutions'] if r['default']]
+        self.assertEqual([reference['resolution']], usual)
 
     def test_the_report_can_wait_for_the_end(self):
         document = self.service.submit(wait=0, F=596, eM=44.5)

@@ -281,6 +281,40 @@ test('the report prints on one A4 page a side and says what it must', async () =
   }
 });
 
+test('a result of another mesh, skin or model says so, and is neither ranked nor joined', async () => {
+  const otherwise = [
+    { resolution: 'fine' },
+    { skin: { mu: 67, thickness: 2.5 } },
+    { model: { name: 'as-published', bulk_ratio: 100 } },
+  ];
+  const said = [/Resolution: Fine/, /skin\.thickness 2\.5\smm/, /model\.bulk_ratio 100/];
+  for (const [i, change] of otherwise.entries()) {
+    await compute(`P-other-${i}`, ['left'], { measured_at: '2026-01-10' });
+    await all_ended(1);
+    await compute(`P-other-${i}`, ['left'], { measured_at: '2026-03-10' });
+    await all_ended(1);
+    assert.equal(await page.locator('.strip .ours').count(), 3);
+    await page.locator('svg.history .mark').nth(1).waitFor();
+    assert.match((await on_paper(page)).text[0], /Resolution: Standard · Assessment/);
+    const [document] = [...s.daemon.documents.values()].slice(-1);
+    Object.assign(document, change);
+    await page.reload();
+    await all_ended(1);
+    const heading = page.locator('.card > header .hint').first();
+    assert.match(await heading.innerText(), said[i]);
+    assert.equal(await page.locator('svg.strip').count(), 0);
+    assert.match(await page.locator('.no-rank').innerText(), /macron2020-local 1, standard/);
+    await page.getByText('Not in the chart, computed otherwise: 1.').waitFor();
+    assert.equal(await page.locator('svg.history .mark').count(), 0);
+    assert.match(await page.locator('tr.ours .otherwise').innerText(), said[i]);
+    await page.locator('.report .ids', { hasText: 'Ischia' }).waitFor({ state: 'attached' });
+    const paper = await on_paper(page);
+    assert.match(paper.text[0].replace(/\s+/g, ' '), said[i]);
+    assert.equal(paper.pages, 1);
+    await assert_accessible(page, `a result with ${Object.keys(change)[0]} of its own`);
+  }
+});
+
 /* Assessments that ended without being computed, straight into the daemon. */
 function add_many(n, body) {
   const numbers = { R1: 7, R2: 20, eM: 30, eF: 10, muM: 8, muF: 5, F: 200 };

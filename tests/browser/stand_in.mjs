@@ -87,6 +87,15 @@ const parameters_in = (tag) =>
       }
     : parameters;
 
+const default_model = {
+  name: 'default',
+  L_over_h: 2,
+  bulk_ratio: 2000,
+  friction: 0.4,
+  R2_surface: 0,
+  embed_over_R1: 1,
+};
+
 const cluster_set = (threshold, volume, F, tip) => ({
   ...(threshold ? { threshold } : {}),
   volume_mm3: volume,
@@ -491,6 +500,9 @@ export class StandIn {
       resolution: body.resolution ?? 'standard',
       skin: { mu: 67, thickness: 1, ...body.skin },
       sd: body.sd || null,
+      skin: { mu: 67, thickness: 1, ...body.skin },
+      resolution: body.resolution ?? 'standard',
+      model: { ...default_model, ...body.model },
       parameters: Object.fromEntries(parameters.parameters.map(({ key }) => [key, body[key]])),
       progress: 0,
       result: null,

@@ -168,6 +168,7 @@ test('a result shows its interval, in numbers and as bars', async () => {
     /not reached/,
   ])
     assert.match(text, part);
+  assert.match(await card.locator('.warning').last().innerText(), /2 of 4 full solves/);
   assert.deepEqual(
     (await card.locator('.better strong').allInnerTexts()).map((t) => /(\d+)\s%/.exec(t)[1]),
     ['61', '22', '12'],

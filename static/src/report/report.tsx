@@ -10,6 +10,7 @@ import { general_caveats, warning_text } from '../result/caveats.js';
 import { interval_text } from '../result/interval.js';
 import { by_share, keys_outside } from '../result/uncertainty.js';
 import { share_of_muscle, tip_height, type Finished } from '../result/quantities.js';
+import { options_text, resolution_text } from '../result/settings.js';
 import type { ClusterSet } from '../types.js';
 import { column_names, Shape } from '../ui.js';
 
@@ -211,6 +212,8 @@ function Report(props: { of: Finished; name: string; parameters: Parameters; ver
           {[
             version && t('report.program', { version }),
             `${t('report.model')} ${model.name} ${model.version}`,
+            resolution_text(of),
+            options_text(of),
             `${t('report.id')} ${of.id}`,
             `${t('report.created')} ${format_time(of.created_at)}`,
             t('report.printed', { time: format_time(new Date().toISOString()) }),

@@ -5,11 +5,13 @@ import { useEffect, useState } from 'preact/hooks';
 import { list } from '../api.js';
 import { has_ended } from '../follow.js';
 import { format, format_fixed, format_time, t } from '../i18n.js';
+import { computed_alike } from '../reference.js';
 import { result_address } from '../router.js';
 import type { Assessment, Side } from '../types.js';
 import { Link, Outcome, side_letter, side_name } from '../ui.js';
 import { axis_of } from './axis.js';
 import { finished, type Finished } from './quantities.js';
+import { unusual_text } from './settings.js';
 
 const size = { width: 460, height: 120, left: 36, right: 20, top: 12, foot: 22 };
 const inset = 22;
@@ -117,7 +119,14 @@ function Row(props: { of: Assessment; current: boolean }) {
           <Link to={result_address([of.id])}>{format_time(time_of(of))}</Link>
         )}
       </th>
-      <td class="text">{side_name(of.side)}</td>
+      <td class="text">
+        {side_name(of.side)}
+        {unusual_text(of).map((text) => (
+          <span key={text} class="hint otherwise">
+            {text}
+          </span>
+        ))}
+      </td>
       <td class="text">
         <Outcome of={of} />
       </td>
@@ -134,6 +143,9 @@ export function History(props: { documents: Assessment[] }) {
   if (!subject || !items) return null;
   const current = props.documents.map((d) => d.id);
   const others = items.filter((d) => !current.includes(d.id));
+  const ended = finished(items);
+  const [shown] = finished(props.documents);
+  const drawn = ended.filter((d) => !shown || computed_alike(d, shown));
   return (
     <section class="panel-box" aria-labelledby="history">
       <h2 id="history">{t('history.title', { subject })}</h2>
@@ -141,7 +153,12 @@ export function History(props: { documents: Assessment[] }) {
         <p class="hint">{t('history.none')}</p>
       ) : (
         <div class="beside-chart">
-          <Chart items={finished(items)} current={current} />
+          <div>
+            <Chart items={drawn} current={current} />
+            {drawn.length < ended.length && (
+              <p class="hint">{t('history.other', { n: ended.length - drawn.length })}</p>
+            )}
+          </div>
           <div class="scroll" tabIndex={0} role="group" aria-labelledby="history">
             <table class="numbers small">
               <thead>

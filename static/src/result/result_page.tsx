@@ -16,7 +16,7 @@ import {
 import { use_emulator } from '../emulator.js';
 import { fits_one_form, is_pair } from '../form/earlier.js';
 import { Follower, has_ended, type Followed } from '../follow.js';
-import { format_time, language, t, t_or } from '../i18n.js';
+import { format_time, language, t } from '../i18n.js';
 import { form_address } from '../router.js';
 import { Reports } from '../report/report.js';
 import type { Assessment } from '../types.js';
@@ -28,6 +28,7 @@ import { LoadCurve } from './load_curve.js';
 import { Numbers } from './numbers.js';
 import { Picture } from './picture.js';
 import { finished, type Finished } from './quantities.js';
+import { unusual_text } from './settings.js';
 import { Strips } from './strip.js';
 import { UncertaintyCard } from './uncertainty.js';
 import { NoResult, Running } from './waiting.js';
@@ -154,9 +155,7 @@ function Meta(props: { of: Assessment }) {
     of.subject ? t('result.subject', { subject: of.subject }) : '',
     of.label ?? '',
     of.measured_at ? t('result.measured', { time: format_time(of.measured_at) }) : '',
-    of.resolution && of.resolution !== 'standard'
-      ? `${t('form.resolution')}: ${t_or(`form.resolution.${of.resolution}`, of.resolution)}`
-      : '',
+    ...unusual_text(of),
     of.finished_at ? t('result.computed', { time: format_time(of.finished_at) }) : '',
   ];
   return <p class="hint">{parts.filter(Boolean).join(' · ')}</p>;

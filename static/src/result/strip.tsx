@@ -3,7 +3,7 @@
 // These sides among the 26 of Table 2: a strip a quantity, every reference side a ring, ours a
 // labelled pointer; the same in numbers beside it.
 import { format, format_fixed, t, type Key } from '../i18n.js';
-import { comparable_sides, type ReferenceSide } from '../reference.js';
+import { comparable_sides, reference_model, type ReferenceSide } from '../reference.js';
 import type { Quantiles, Result } from '../types.js';
 import { column_letters, column_names, side_letter } from '../ui.js';
 import { axis_of } from './axis.js';
@@ -197,7 +197,9 @@ function All(props: { sides: ReferenceSide[] }) {
 
 export function Strips(props: { documents: Finished[] }) {
   const sides = comparable_sides(props.documents);
-  if (sides.length === 0 || props.documents.length === 0) return null;
+  if (!reference_model || props.documents.length === 0) return null;
+  if (sides.length === 0)
+    return <p class="panel-box hint no-rank">{t('strip.none', { model: reference_model })}</p>;
   return (
     <section class="panel-box strips" aria-labelledby="strips">
       <h2 id="strips">{t('strip.title', { n: sides.length })}</h2>

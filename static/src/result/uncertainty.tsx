@@ -117,7 +117,11 @@ function Checks(props: { of: Uncertainty }) {
   const good = checks.filter(
     (c) => c.eps_max !== null && c.low <= c.eps_max && c.eps_max <= c.high,
   );
-  return <p class="hint">{t('uncertain.checks', { good: good.length, n: checks.length })}</p>;
+  return (
+    <p class={good.length < checks.length ? 'warning' : 'hint'}>
+      {t('uncertain.checks', { good: good.length, n: checks.length })}
+    </p>
+  );
 }
 
 function Given(props: { of: Uncertainty; inputs: ParameterInfo[]; label: string }) {
