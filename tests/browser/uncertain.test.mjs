@@ -178,6 +178,18 @@ test('a result shows its interval, in numbers and as bars', async () => {
   await assert_accessible(page, 'a result with intervals');
 });
 
+test('a phone shows an uncertain result without sideways scrolling', async () => {
+  await compute('P-7', ['left'], 'typical');
+  for (const width of [390, 320]) {
+    await page.setViewportSize({ width, height: 844 });
+    for (const tag of ['de', 'fr', 'en']) {
+      await page.selectOption('.language select', tag);
+      const content = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(content <= width, `${width} in ${tag}: ${content}`);
+    }
+  }
+});
+
 test('without an interval the page says why', async () => {
   await compute('outside-1', ['left'], 'typical');
   const text = await page.locator('.uncertain').innerText();
