@@ -59,6 +59,8 @@ build() {
   ninja -C "$dir"
 }
 
+# Many tests wait (for a browser, a lease, a kill): one more at once than there are processors.
+processes=$(($(nproc) + 1))
 logs=() status=0
 # run_suites DIR NAME ARGUMENT...: meson's tests of one build; its log joins the final count.
 # (Meson appends the name of a test setup to the log's.) The time limits of the tests are for a test
@@ -68,7 +70,7 @@ run_suites() {
   shift 2
   rm -f "$dir/meson-logs/count-$name"*.json
   echo "== testing $dir: $name"
-  meson test -C "$dir" --no-rebuild --print-errorlogs \
+  meson test -C "$dir" --no-rebuild --print-errorlogs --num-processes "$processes" \
     --timeout-multiplier 4 --logbase "count-$name" "$@" || status=1
   logs+=("$dir/meson-logs/count-$name"*.json)
 }
