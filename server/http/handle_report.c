@@ -164,10 +164,12 @@ static void put_largest(const struct report *r, const struct ischia_case *c,
 {
     const double tip_mm =
         c->option[ISCHIA_SKIN_THICKNESS] + c->param[ISCHIA_EF] + c->param[ISCHIA_EM];
+    const double depth_mm = tip_mm - set->largest.centroid_mm[2];
     if (set->has_largest)
-        put_filled(r, "<td class=\"n\">", WORD_DAEMON_REPORT_WHERE,
+        put_filled(r, "<td class=\"n long\">",
+                   depth_mm < 0 ? WORD_REPORT_LARGEST_ABOVE : WORD_DAEMON_REPORT_WHERE,
                    WORDS(word_fixed("volume", set->largest.volume_mm3, 0),
-                         word_fixed("depth", tip_mm - set->largest.centroid_mm[2], 1)));
+                         word_fixed("depth", fabs(depth_mm), 1)));
     else
         put_number(r, say(r, WORD_DAEMON_REPORT_NONE));
 }
@@ -301,27 +303,28 @@ static void put_intervals(const struct report *r, const struct ischia_uncertaint
     end_table(r);
 }
 
-/* Inputs by name, with a percentage each: a share of the spread, or of the samples outside. */
-static const char *list_inputs(const struct report *r, const double *share, double least,
-                               char *text, size_t size)
-{
-    size_t used = 0;
-    text[0] = '\0';
-    for (int i = 0; i < ISCHIA_PARAM_COUNT && used < size; i++) {
-        char percent[WORDS_NUMBER_BYTES];
-        if (!(share[i] >= least)) continue;
-        used += (size_t)snprintf(text + used, size - used, "%s%s %s\u202f%%", used > 0 ? ", " : "",
-                                 ischia_params[i].key,
-                                 words_fixed(percent, r->language, 100 * share[i], 0));
-    }
-    return text;
-}
-
 static void put_percent(const struct report *r, double share, char ret[WORDS_NUMBER_BYTES + 8])
 {
     char number[WORDS_NUMBER_BYTES];
     (void)snprintf(ret, WORDS_NUMBER_BYTES + 8, "%s\u202f%%",
                    words_fixed(number, r->language, 100 * share, 0));
+}
+
+/* Inputs by name, and with a percentage each: a share of the spread, or of the samples outside. */
+static const char *list_inputs(const struct report *r, const double *share, double least,
+                               bool with_share, char *text, size_t size)
+{
+    size_t used = 0;
+    text[0] = '\0';
+    for (int i = 0; i < ISCHIA_PARAM_COUNT && used < size; i++) {
+        char percent[WORDS_NUMBER_BYTES + 8];
+        if (!(share[i] >= least)) continue;
+        put_percent(r, share[i], percent);
+        used += (size_t)snprintf(text + used, size - used, "%s%s%s%s", used > 0 ? ", " : "",
+                                 ischia_params[i].key, with_share ? " " : "",
+                                 with_share ? percent : "");
+    }
+    return text;
 }
 
 static void put_certainty(const struct report *r, const struct ischia_uncertainty *u)
@@ -335,7 +338,7 @@ static void put_certainty(const struct report *r, const struct ischia_uncertaint
     page_put(r->out, " ");
     page_fill(r->out, r->language, WORD_UNCERTAIN_MODEL_FORM,
               WORDS(word_number("error", ISCHIA_MODEL_FORM_EPS_MAX, 6)));
-    if (list_inputs(r, u->total, 0.05, list, sizeof list)[0] != '\0') {
+    if (list_inputs(r, u->total, 0.05, true, list, sizeof list)[0] != '\0') {
         page_put(r->out, " ");
         page_fill(r->out, r->language, WORD_DAEMON_UNCERTAIN_BETTER,
                   WORDS(word_text("list", list)));
@@ -350,12 +353,15 @@ static void put_no_interval(const struct report *r, const struct ischia_uncertai
         [UNCERTAINTY_OTHER_MODEL] = WORD_UNCERTAIN_NONE_OTHER_MODEL,
         [UNCERTAINTY_OUTSIDE] = WORD_UNCERTAIN_NONE_OUTSIDE_TRAINING,
     };
+    /* Without a sample the measurement itself is outside. */
+    const bool itself = u->status == UNCERTAINTY_OUTSIDE && u->samples == 0;
     char list[160];
     page_put(r->out, "<p>");
     page_word(r->out, r->language, WORD_DAEMON_UNCERTAIN_NONE);
     page_put(r->out, ": ");
-    page_fill(r->out, r->language, why[u->status],
-              WORDS(word_text("keys", list_inputs(r, u->outside, 1e-9, list, sizeof list))));
+    page_fill(
+        r->out, r->language, itself ? WORD_UNCERTAIN_NONE_OUTSIDE_ITSELF : why[u->status],
+        WORDS(word_text("keys", list_inputs(r, u->outside, 1e-9, !itself, list, sizeof list))));
     page_put(r->out, "</p>\n");
 }
 

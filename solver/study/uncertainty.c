@@ -381,6 +381,14 @@ static enum uncertainty_status status_of(const struct predictor *p, const struct
     return predictor_knows(p, c) ? UNCERTAINTY_GIVEN : UNCERTAINTY_OUTSIDE;
 }
 
+/* No sample is drawn around a case that the emulator does not know: all of them would be outside. */
+static void name_outside(const struct predictor *p, const struct ischia_case *c,
+                         struct ischia_uncertainty *u)
+{
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
+        if (!predictor_covers(p, c, (enum ischia_param)i)) u->outside[i] = 1;
+}
+
 static bool varies(const double sd[ISCHIA_PARAM_COUNT])
 {
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
@@ -423,6 +431,8 @@ uncertainty_compute(struct ischia_uncertainty *ret, const struct predictor *pred
         }
         samples_finish(&s);
         TRY(code);
+    } else if (u.status == UNCERTAINTY_OUTSIDE) {
+        name_outside(predictor, c, &u);
     }
     *ret = u;
     return ISCHIA_OK;

@@ -65,7 +65,9 @@ struct ischia_uncertainty {
     bool typical; /* they are sampling_sd_typical's */
     bool trial;   /* the emulator was made for trying out */
     int samples, inside;
-    double outside[ISCHIA_PARAM_COUNT]; /* share of samples that an input alone puts outside */
+    /* Share of samples that an input alone puts outside; 1, and no sample, where the measured case
+     * itself is outside by it. */
+    double outside[ISCHIA_PARAM_COUNT];
     /* NaN without an interval; a force that the threshold is not reached by is NaN too */
     double quantile[UNCERTAIN_COUNT][UNCERTAINTY_QUANTILES];
     double share_shear, share_compression, share_both; /* of samples that cross the thresholds */

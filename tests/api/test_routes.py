@@ -575,6 +575,11 @@ class Routes(unittest.TestCase):
             document['created_at'],
         ):
             self.assertIn(text, page)
+        body = document['result']['clusters']['shear']['largest']  # the double's is above the bone
+        tip = 1 + document['parameters']['eF'] + document['parameters']['eM']
+        height = f'{body["centroid_mm"][2] - tip:.1f} mm above the bone\u2019s lowest point'
+        self.assertIn(f'<td class="n long">{body["volume_mm3"]:.0f} mm\u00b3, {height}</td>', page)
+        self.assertNotRegex(page, r'[>\s]-\d')
         parameters = self.service.get('/v1/parameters').json()['parameters']
         for parameter in parameters:  # name, key, value, unit
             value = document['parameters'][parameter['key']]

@@ -281,6 +281,34 @@ test('the report prints on one A4 page a side and says what it must', async () =
   }
 });
 
+test('a body beside the bone lies above its lowest point, in every language', async () => {
+  const above = {
+    en: /2\.7 mm above the bone’s lowest point/,
+    fr: /2,7 mm au-dessus du point le plus bas de l’os/,
+    de: /2,7 mm über dem tiefsten Punkt des Knochens/,
+  };
+  const shear = { en: /E shear/, fr: /E cis\./, de: /E Scher/ };
+  await compute('P-above', ['left']);
+  await all_ended(1);
+  const [document] = [...s.daemon.documents.values()].slice(-1);
+  for (const set of Object.values(document.result.clusters)) set.largest.centroid_mm[2] = 44.7;
+  await page.reload();
+  await all_ended(1);
+  for (const tag of ['de', 'fr', 'en']) {
+    await page.selectOption('.language select', tag);
+    await page.locator('.glance', { hasText: above[tag] }).waitFor();
+    const { pages, text } = await on_paper(page);
+    assert.equal(pages, 1);
+    /* Words of one cell, beside those of the others: the cell is wrapped. */
+    const table = await page.locator('.report td.long').allTextContents();
+    assert.match(table[0], above[tag]);
+    assert.deepEqual(await cut_off(page), []);
+    assert.match(text[0], shear[tag]);
+    assert.doesNotMatch(text[0], /[-−]2[.,]7/);
+    if (tag !== 'en') assert.doesNotMatch(text[0], /E (shear|comp\s)/);
+  }
+});
+
 test('a result of another mesh, skin or model says so, and is neither ranked nor joined', async () => {
   const otherwise = [
     { resolution: 'fine' },

@@ -137,11 +137,13 @@ function load_curve(F, top_shear, top_comp) {
 const around = (value, part) =>
   [-1.6, -0.7, 0, 0.7, 1.6].map((z) => Number((value * (1 + z * part)).toPrecision(8)));
 
-/* As the daemon gives it; a subject `outside...` has no interval. */
+/* As the daemon gives it; a subject `outside...` has no interval, that of `outside-itself...` was not
+ * even sampled. */
 function uncertainty_of(document, result) {
   const keys = parameters.parameters.map(({ key }) => key);
   const all = (value) => Object.fromEntries(keys.map((key) => [key, value]));
   const given = !document.subject?.startsWith('outside');
+  const sampled = !document.subject?.startsWith('outside-itself');
   const five = (value, part) => (given ? around(value, part) : Array(5).fill(null));
   const total = { ...all(0), R2: 0.61, muM: 0.22, F: 0.12, R1: 0.04 };
   return {
@@ -149,9 +151,9 @@ function uncertainty_of(document, result) {
     typical: document.sd === 'typical',
     sd: document.sd === 'typical' ? all(1) : { ...all(0), ...document.sd },
     trial: false,
-    samples: 2048,
-    inside: given ? 2000 : 900,
-    outside: { ...all(0), R2: given ? 0.023 : 0.56 },
+    samples: sampled ? 2048 : 0,
+    inside: given ? 2000 : sampled ? 900 : 0,
+    outside: { ...all(0), R2: given ? 0.023 : sampled ? 0.56 : 1 },
     quantiles: [0.05, 0.25, 0.5, 0.75, 0.95],
     strain: {
       eps_max: five(result.strain.eps_max, 0.05),

@@ -195,6 +195,12 @@ test('without an interval the page says why', async () => {
   const text = await page.locator('.uncertain').innerText();
   assert.match(text, /No interval: too many samples lie outside .* \(R2\)/);
   assert.equal(await page.locator('.interval path').count(), 0);
+  await open_form(page, s.origin);
+  await compute('outside-itself-1', ['left'], 'typical');
+  const itself = /No interval: what was measured lies outside .* \(R2\)/;
+  assert.match(await page.locator('.uncertain').innerText(), itself);
+  await page.locator('.report .certainty').waitFor({ state: 'attached' });
+  assert.match((await on_paper(page)).text[0].replace(/\s+/g, ' '), itself);
 });
 
 test('the report holds the interval and still fits its page', async () => {

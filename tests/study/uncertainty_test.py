@@ -303,6 +303,12 @@ class ThroughTheService(Intervals):
         outside = self.ask({**CASE, "sd": SD, "model": "as-published"})
         page = self.service.get(outside["links"]["report"]).body.decode()
         self.assertIn("No interval: ", page)
+        outside = self.ask({**CASE, "F": 60, "sd": "typical"})
+        interval = outside["result"]["uncertainty"]
+        self.assertEqual((interval["samples"], interval["outside"]["F"]), (0, 1))
+        page = self.service.get(outside["links"]["report"]).body.decode()
+        self.assertIn("No interval: what was measured lies outside", page)
+        self.assertIn("trained for (F).", page)
 
     def test_record_systems_get_it(self):
         units = {"muM": "kPa", "muF": "kPa", "F": "N"}

@@ -204,8 +204,12 @@ static void beyond_the_training_there_is_none(void **state)
     assert_int_equal(u.status, UNCERTAINTY_GIVEN);
     near(u.outside[ISCHIA_EM], 0.0668, 0.01);
     near(u.inside, u.samples * (1 - u.outside[ISCHIA_EM]), 0.5);
-    c.param[ISCHIA_EM] = 45;
-    assert_int_equal(compute(&p, &c, sd, 0, 1).status, UNCERTAINTY_OUTSIDE);
+    c.param[ISCHIA_EM] = 45; /* itself outside: no sample, but said which input */
+    u = compute(&p, &c, sd, 0, 1);
+    assert_int_equal(u.status, UNCERTAINTY_OUTSIDE);
+    assert_int_equal(u.samples, 0);
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
+        assert_true(u.outside[i] == (i == ISCHIA_EM ? 1 : 0));
     c = centre();
     c.option[ISCHIA_FRICTION] = 0.3;
     assert_int_equal(compute(&p, &c, sd, 0, 1).status, UNCERTAINTY_OTHER_MODEL);

@@ -8,7 +8,7 @@ import { format, format_fixed, format_percent, format_time, t } from '../i18n.js
 import { Symbol_ } from '../form/field.js';
 import { general_caveats, warning_text } from '../result/caveats.js';
 import { interval_text } from '../result/interval.js';
-import { by_share, keys_outside } from '../result/uncertainty.js';
+import { by_share, why_none } from '../result/uncertainty.js';
 import { share_of_muscle, tip_height, type Finished } from '../result/quantities.js';
 import { options_text, resolution_text } from '../result/settings.js';
 import type { ClusterSet } from '../types.js';
@@ -41,19 +41,19 @@ function Strain(props: { of: Finished }) {
     t('curve.threshold', { value: set.threshold ?? '' });
   const rows: [string, string, string, string][] = [
     [
-      'ε max',
+      t('curve.col.eps'),
       t('report.engineering'),
       `${format_fixed(strain.eps_max, 3)} ± ${format_fixed(numerics.eps_max_error, 3)}`,
       t('report.depth', { depth }),
     ],
     [
-      'E shear',
+      t('curve.col.shear'),
       t('report.green_lagrange'),
       format_fixed(strain.E_shear_max, 3),
       threshold(clusters.shear),
     ],
     [
-      'E comp',
+      t('curve.col.comp'),
       t('report.green_lagrange'),
       format_fixed(strain.E_comp_max, 3),
       threshold(clusters.compression),
@@ -83,10 +83,13 @@ function Strain(props: { of: Finished }) {
 function Clusters(props: { of: Finished; skin_mm: number }) {
   const { result, parameters } = props.of;
   const tip = tip_height(props.of, props.skin_mm);
-  const largest = ({ largest: body }: ClusterSet): string =>
-    body
-      ? `${format_fixed(body.volume_mm3, 0)} mm³, ${format_fixed(tip - body.centroid_mm[2], 1)} mm`
-      : '–';
+  const largest = ({ largest: body }: ClusterSet): string => {
+    if (!body) return '–';
+    const below = tip - body.centroid_mm[2];
+    const volume = format_fixed(body.volume_mm3, 0);
+    const depth = format_fixed(Math.abs(below), 1);
+    return below < 0 ? t('report.largest.above', { volume, depth }) : `${volume} mm³, ${depth} mm`;
+  };
   const { clusters, threshold_force_N: force } = result;
   const first = (N: number | null | undefined): string => {
     if (N === undefined) return '';
@@ -134,7 +137,7 @@ function Clusters(props: { of: Finished; skin_mm: number }) {
               <td class="n">{format_fixed(set.volume_mm3, 0)}</td>
               <td class="n">{share === null ? '–' : format_percent(share)}</td>
               <td class="n">{set.count}</td>
-              <td class="n">{largest(set)}</td>
+              <td class="n long">{largest(set)}</td>
               <td class="n">{first(N)}</td>
             </tr>
           );
@@ -148,8 +151,7 @@ function Clusters(props: { of: Finished; skin_mm: number }) {
 function Certainty(props: { of: Finished }) {
   const u = props.of.result.uncertainty;
   if (!u) return null;
-  if (u.status !== 'given')
-    return <p class="certainty">{t(`uncertain.none.${u.status}`, { keys: keys_outside(u) })}</p>;
+  if (u.status !== 'given') return <p class="certainty">{why_none(u)}</p>;
   const between = [
     `ε max ${interval_text(u.strain.eps_max, 3)}`,
     `${t('numbers.v_shear')} ${interval_text(u.clusters.shear.volume_mm3, 0, ' mm³')}`,

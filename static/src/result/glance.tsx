@@ -34,8 +34,10 @@ function Volume(props: { set: ClusterSet; result: Result }) {
 function Where(props: { set: ClusterSet; tip: number }) {
   const { set, tip } = props;
   if (!set.largest) return null;
-  const depth = format_fixed(tip - set.largest.centroid_mm[2], 1);
-  return <span class="more">{`${bodies(set)}, ${t('glance.where', { depth })}`}</span>;
+  const below = tip - set.largest.centroid_mm[2];
+  const depth = format_fixed(Math.abs(below), 1);
+  const where = t(below < 0 ? 'glance.where.above' : 'glance.where', { depth });
+  return <span class="more">{`${bodies(set)}, ${where}`}</span>;
 }
 
 /* What the uncertain measurements leave open. */

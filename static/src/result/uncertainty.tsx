@@ -105,11 +105,18 @@ function deviations(u: Uncertainty, inputs: ParameterInfo[]): string {
     .join(', ');
 }
 
-export const keys_outside = (u: Uncertainty): string =>
+const keys_outside = (u: Uncertainty): string =>
   Object.entries(u.outside)
     .filter(([, share]) => share > 0)
     .map(([key]) => key)
     .join(', ');
+
+/* Why there is no interval. Without a sample the measurement itself is outside. */
+export function why_none(u: Uncertainty): string {
+  const outside = u.status === 'outside_training' && u.samples === 0;
+  const key = outside ? 'uncertain.none.outside_itself' : (`uncertain.none.${u.status}` as Key);
+  return t(key, { keys: keys_outside(u) });
+}
 
 function Checks(props: { of: Uncertainty }) {
   const { checks } = props.of;
@@ -163,7 +170,7 @@ export function UncertaintyCard(props: { of: Finished; inputs: ParameterInfo[]; 
       {u.status === 'given' ? (
         <Given of={u} inputs={props.inputs} label={heading} />
       ) : (
-        <p>{t(`uncertain.none.${u.status}`, { keys: keys_outside(u) })}</p>
+        <p>{why_none(u)}</p>
       )}
     </section>
   );
