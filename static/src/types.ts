@@ -153,7 +153,7 @@ export interface Assessment {
   measured_at?: string | null;
   resolution?: string;
   sd?: 'typical' | Record<string, number> | null;
-  skin?: { mu: number; thickness: number } | null;
+  skin?: Record<string, number> | null;
   model?: Record<string, number | string> | null; /* options, and the name of their set */
   parameters: Record<string, number>;
   progress: number;
