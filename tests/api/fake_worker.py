@@ -51,12 +51,14 @@ def result_of(case):
             'centroid_mm': [0, 0, case['eF'] + 1],
         },
     }
+    # Beside the bone, above its lowest point: the skin is 1 mm thick.
+    beside = {**over, 'largest': {**over['largest'], 'centroid_mm': [20, 0, case['eF'] + case['eM'] + 3.7]}}
     force = case['F']
     return {
         'strain': {'eps_max': 1.2, 'eps_max_depth_mm': 3.5, 'E_shear_max': 1.5, 'E_comp_max': 0.47},
         'clusters': {
             'shear': {'threshold': 0.75, **over},
-            'compression': {'threshold': 0.45, **over},
+            'compression': {'threshold': 0.45, **beside},
             'both': over,
         },
         'muscle_volume_mm3': 50000.0,

@@ -575,10 +575,8 @@ class Routes(unittest.TestCase):
             document['created_at'],
         ):
             self.assertIn(text, page)
-        body = document['result']['clusters']['shear']['largest']  # the double's is above the bone
-        tip = 1 + document['parameters']['eF'] + document['parameters']['eM']
-        height = f'{body["centroid_mm"][2] - tip:.1f} mm above the bone\u2019s lowest point'
-        self.assertIn(f'<td class="n long">{body["volume_mm3"]:.0f} mm\u00b3, {height}</td>', page)
+        for where in (f'{document["parameters"]["eM"]:.1f} mm', '2.7 mm above the bone\u2019s lowest point'):
+            self.assertIn(f'<td class="n long">100 mm\u00b3, {where}</td>', page)
         self.assertNotRegex(page, r'[>\s]-\d')
         parameters = self.service.get('/v1/parameters').json()['parameters']
         for parameter in parameters:  # name, key, value, unit

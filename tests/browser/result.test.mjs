@@ -173,6 +173,34 @@ test('numbers stand in tables beside the charts', async () => {
   await assert_accessible(page, 'the result with its tables open');
 });
 
+test('no words of the load curve lie on others, nor on a crossing', async () => {
+  await compute('P-late', ['left']);
+  await all_ended(1);
+  const [document] = [...s.daemon.documents.values()].slice(-1);
+  for (const part of [0.3, 0.74, 0.8, 0.97]) {
+    const scale = 162 / document.parameters.F; /* 150 would be under 162 */
+    document.parameters.F = 162;
+    for (const point of document.result.load_curve) point.F_N *= scale;
+    document.result.threshold_force_N = { shear: part * 162, compression: part * 162 };
+    for (const tag of ['fr', 'de', 'en']) {
+      await page.goto(`${s.origin}/assessments/${document.id}?lang=${tag}`);
+      await all_ended(1);
+      const on_others = await page.locator('.curve svg').first().evaluate((svg) => {
+        const boxes = [...svg.querySelectorAll('text, .crossed path')].map((e) => ({
+          box: e.getBoundingClientRect(),
+          says: e.textContent || 'crossing',
+        }));
+        const meet = (a, b) =>
+          a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+        return boxes.flatMap((a, i) =>
+          boxes.slice(i + 1).flatMap((b) => (meet(a.box, b.box) ? [`${a.says} / ${b.says}`] : [])),
+        );
+      });
+      assert.deepEqual(on_others, [], `${tag}, crossing at ${part}`);
+    }
+  }
+});
+
 test('history of the same subject, and the list, its filter and its comparison', async () => {
   await compute('P-4', ['left'], { measured_at: '2026-01-10' });
   await all_ended(1);

@@ -303,7 +303,7 @@ class ThroughTheService(Intervals):
         outside = self.ask({**CASE, "sd": SD, "model": "as-published"})
         page = self.service.get(outside["links"]["report"]).body.decode()
         self.assertIn("No interval: ", page)
-        outside = self.ask({**CASE, "F": 60, "sd": "typical"})
+        outside = self.ask({**CASE, "F": 10, "sd": "typical"})
         interval = outside["result"]["uncertainty"]
         self.assertEqual((interval["samples"], interval["outside"]["F"]), (0, 1))
         page = self.service.get(outside["links"]["report"]).body.decode()

@@ -9,6 +9,9 @@ import { given, interval_of, type Interval } from './interval.js';
 import type { Finished } from './quantities.js';
 
 const width = 340;
+/* For the longest words at a threshold, and between two numbers on the axis of force. */
+const label_room = 84;
+const tick_room = 40;
 const plot = { left: 32, right: 8, height: 78, gap: 30, top: 18, foot: 34 };
 
 interface Panel {
@@ -96,7 +99,11 @@ function PanelPlot(props: {
   const line = points.map((p, i) => `${i ? 'L' : 'M'}${x(p.F_N)} ${y(panel.of(p))}`).join('');
   const y_threshold = y(panel.threshold);
   const ends_above = panel.of(points[points.length - 1] as LoadPoint) > panel.threshold;
-  const y_label = y_threshold + (ends_above ? 12 : -5); /* the side that the line leaves free */
+  const end = width - plot.right;
+  /* Under the line's end when it is above the threshold. A late crossing would go through the
+   * words there; before it the space above the threshold is free. */
+  const late = panel.crossed !== null && x(panel.crossed) > end - label_room;
+  const y_label = y_threshold + (ends_above && !late ? 12 : -5);
   const latest = 0.8 * (points[points.length - 1]?.F_N ?? 0); /* a label after it would not fit */
   return (
     <g class={`panel ${panel.class}`}>
@@ -111,8 +118,13 @@ function PanelPlot(props: {
           </text>
         </g>
       ))}
-      <path class="threshold" d={`M${plot.left} ${y_threshold}H${width - plot.right}`} />
-      <text class="threshold" x={width - plot.right} y={y_label} text-anchor="end">
+      <path class="threshold" d={`M${plot.left} ${y_threshold}H${end}`} />
+      <text
+        class="threshold"
+        x={late ? plot.left + 2 : end}
+        y={y_label}
+        text-anchor={late ? 'start' : 'end'}
+      >
         {t('curve.threshold', { value: panel.threshold })}
       </text>
       <path class="line" d={line} />
@@ -195,11 +207,13 @@ export function LoadCurve(props: { of: Finished; side: string }) {
         {panels(result).map((panel, i) => (
           <PanelPlot key={panel.class} panel={panel} points={points} index={i} x={x} />
         ))}
-        {ticks(F * 0.93, 4).map((force) => (
-          <text key={force} class="tick" x={x(force)} y={bottom + 14} text-anchor="middle">
-            {format(force)}
-          </text>
-        ))}
+        {ticks(F, 4)
+          .filter((force) => x(F) - x(force) > tick_room)
+          .map((force) => (
+            <text key={force} class="tick" x={x(force)} y={bottom + 14} text-anchor="middle">
+              {format(force)}
+            </text>
+          ))}
         <text class="tick end" x={x(F)} y={bottom + 14} text-anchor="end">
           {format(F)}
         </text>
