@@ -381,7 +381,7 @@ static enum uncertainty_status status_of(const struct predictor *p, const struct
     return predictor_knows(p, c) ? UNCERTAINTY_GIVEN : UNCERTAINTY_OUTSIDE;
 }
 
-/* No sample is drawn around a case that the emulator does not know: all of them would be outside. */
+/* No sample is drawn around a case that the emulator does not know: all would be outside. */
 static void name_outside(const struct predictor *p, const struct ischia_case *c,
                          struct ischia_uncertainty *u)
 {
