@@ -103,7 +103,8 @@ static enum ischia_code show_token(struct store *store, const char *token, struc
     (void)snprintf(id, sizeof id, "%s", token + strlen(AUTH_TOKEN_PREFIX));
     const bool revoked = auth_token_revoke(store, id, &second) == ISCHIA_OK;
     return FAIL(err, unseen.code, "%.200s; the token %s %s", unseen.message, id,
-                revoked ? "has been revoked" : "could not be revoked: do it yourself");
+                revoked ? "has been revoked (token forget erases it)"
+                        : "could not be revoked: do it yourself");
 }
 
 static enum ischia_code token_create(struct store *store, char *const *words, int count,
