@@ -185,17 +185,22 @@ test('no words of the load curve lie on others, nor on a crossing', async () => 
     for (const tag of ['fr', 'de', 'en']) {
       await page.goto(`${s.origin}/assessments/${document.id}?lang=${tag}`);
       await all_ended(1);
-      const on_others = await page.locator('.curve svg').first().evaluate((svg) => {
-        const boxes = [...svg.querySelectorAll('text, .crossed path')].map((e) => ({
-          box: e.getBoundingClientRect(),
-          says: e.textContent || 'crossing',
-        }));
-        const meet = (a, b) =>
-          a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
-        return boxes.flatMap((a, i) =>
-          boxes.slice(i + 1).flatMap((b) => (meet(a.box, b.box) ? [`${a.says} / ${b.says}`] : [])),
-        );
-      });
+      const on_others = await page
+        .locator('.curve svg')
+        .first()
+        .evaluate((svg) => {
+          const boxes = [...svg.querySelectorAll('text, .crossed path')].map((e) => ({
+            box: e.getBoundingClientRect(),
+            says: e.textContent || 'crossing',
+          }));
+          const meet = (a, b) =>
+            a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+          return boxes.flatMap((a, i) =>
+            boxes
+              .slice(i + 1)
+              .flatMap((b) => (meet(a.box, b.box) ? [`${a.says} / ${b.says}`] : [])),
+          );
+        });
       assert.deepEqual(on_others, [], `${tag}, crossing at ${part}`);
     }
   }

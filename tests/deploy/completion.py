@@ -58,7 +58,7 @@ class Completion(unittest.TestCase):
         self.assertTrue({'token', 'audit', 'backup', 'restore'} <= commands)
         self.assertEqual(offered('ischiad', ''), commands)
         self.assertEqual(offered('ischiad', '--state-dir', '/x', 'token', ''),
-                         {'create', 'list', 'revoke'})
+                         {'create', 'list', 'revoke', 'forget'})
         self.assertEqual(offered('ischiad', 'backup', 'isch'), {'ischia', 'ischiad'}, 'files')
 
 
