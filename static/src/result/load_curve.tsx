@@ -9,9 +9,9 @@ import { given, interval_of, type Interval } from './interval.js';
 import type { Finished } from './quantities.js';
 
 const width = 340;
-/* For the longest words at a threshold, and between two numbers on the axis of force. */
-const label_room = 84;
-const tick_room = 40;
+const label_room = 84; /* for the longest words at a threshold */
+/* For the number at the axis' end, and half of the one beside it. */
+const tick_room = (F: number): number => 19 + 7 * format(F).length;
 const plot = { left: 32, right: 8, height: 78, gap: 30, top: 18, foot: 34 };
 
 interface Panel {
@@ -208,7 +208,7 @@ export function LoadCurve(props: { of: Finished; side: string }) {
           <PanelPlot key={panel.class} panel={panel} points={points} index={i} x={x} />
         ))}
         {ticks(F, 4)
-          .filter((force) => x(F) - x(force) > tick_room)
+          .filter((force) => x(F) - x(force) > tick_room(F))
           .map((force) => (
             <text key={force} class="tick" x={x(force)} y={bottom + 14} text-anchor="middle">
               {format(force)}
