@@ -4,7 +4,6 @@
 
 /* What the tests of the store share: a directory with a store in it, and short ways to use it.
  * Each test program is one file, so everything here is static. */
-#include <ftw.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -16,14 +15,15 @@
 #include <cmocka.h>
 
 #include "server/store/store.h"
+#include "tests/unit/test_folder.h"
 #include "tests/unit/test_server.h"
 
 static int64_t clock_ms;
 static inline int64_t fake_now(void) { return clock_ms; }
 
 struct room {
-    char directory[64];
-    char path[128];
+    char directory[128];
+    char path[192];
     struct store *store;
 };
 
@@ -45,8 +45,7 @@ static inline int set_up(void **state)
     struct room *room = calloc(1, sizeof *room);
     assert_non_null(room);
     clock_ms = 1767225600000;
-    (void)stpcpy(room->directory, "/tmp/ischia-store-XXXXXX");
-    assert_non_null(mkdtemp(room->directory));
+    test_folder_make(room->directory, sizeof room->directory, "store");
     (void)snprintf(room->path, sizeof room->path, "%s/state", room->directory);
     if (test_server() != NULL) empty_server();
     open_room(room);
@@ -54,19 +53,11 @@ static inline int set_up(void **state)
     return 0;
 }
 
-static inline int remove_one(const char *path, const struct stat *status, int kind, struct FTW *ftw)
-{
-    (void)status;
-    (void)kind;
-    (void)ftw;
-    return remove(path);
-}
-
 static inline int tear_down(void **state)
 {
     struct room *room = *state;
     store_close(room->store);
-    (void)nftw(room->directory, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+    test_folder_remove(room->directory);
     free(room);
     return 0;
 }

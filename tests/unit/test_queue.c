@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The queue whole: a real store, real processes, a worker that misbehaves on command. */
-#include <ftw.h>
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -16,12 +15,13 @@
 #include <cmocka.h>
 
 #include "server/queue.h"
+#include "tests/unit/test_folder.h"
 #include "tests/unit/test_server.h"
 
 enum { WAIT_MS = 100000 };
 
 struct room {
-    char directory[64];
+    char directory[128];
     struct store *store;
     struct events *events;
     struct queue *queue;
@@ -90,27 +90,18 @@ static int set_up(void **state)
 {
     struct room *room = calloc(1, sizeof *room);
     assert_non_null(room);
-    (void)stpcpy(room->directory, "/tmp/ischia-queue-XXXXXX");
-    assert_non_null(mkdtemp(room->directory));
+    test_folder_make(room->directory, sizeof room->directory, "queue");
     if (test_server() != NULL) empty_server();
     open_queue(room, 2);
     *state = room;
     return 0;
 }
 
-static int remove_one(const char *path, const struct stat *status, int kind, struct FTW *ftw)
-{
-    (void)status;
-    (void)kind;
-    (void)ftw;
-    return remove(path);
-}
-
 static int tear_down(void **state)
 {
     struct room *room = *state;
     close_queue(room, 0);
-    (void)nftw(room->directory, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+    test_folder_remove(room->directory);
     free(room);
     return 0;
 }
