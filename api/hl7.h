@@ -98,7 +98,12 @@ void hl7_put_ack(struct text_out *out, const struct hl7_sender *sender, const st
 /* An assessment that has ended. */
 void hl7_put_result(struct text_out *out, const struct hl7_sender *sender,
                     const struct record *record);
-/* The seven inputs, as a record system would send them: for `ischia hl7 send`. */
+/*
+ * One side as a record system would send it: for `ischia hl7`. A message has a place for the name
+ * of a set of options, not for single ones over it: hl7_carries says whether the whole request
+ * fits, and only then may it be written.
+ */
+bool hl7_carries(const struct ischia_request *request);
 void hl7_put_request(struct text_out *out, const struct hl7_sender *sender,
                      const struct ischia_request *request);
 

@@ -144,11 +144,13 @@ static void put_text_observation(struct text_out *out, int *sequence, const char
     text_put_string(out, "||||||F\r");
 }
 
-static void put_number(struct text_out *out, int *sequence, int measure, const char *digits)
+/* time: OBX-14, when it was measured; "": not said here. */
+static void put_number(struct text_out *out, int *sequence, int measure, const char *digits,
+                       const char *time)
 {
     const struct measure m = measure_at(measure);
-    put(out, "OBX|%d|NM|%s^%s^" HL7_SYSTEM "||%s|%s^^UCUM|||||F\r", ++*sequence, m.code, m.display,
-        digits, m.unit);
+    put(out, "OBX|%d|NM|%s^%s^" HL7_SYSTEM "||%s|%s^^UCUM|||||F%s%s\r", ++*sequence, m.code,
+        m.display, digits, m.unit, time[0] != '\0' ? "|||" : "", time);
 }
 
 static void put_notes(struct text_out *out, const struct record *record)
@@ -188,7 +190,7 @@ void hl7_put_result(struct text_out *out, const struct hl7_sender *sender,
                              ischia_side_names[record->request.side]);
     for (int i = 0; i < MEASURE_COUNT; i++)
         if (record_digits(record, i, digits)[0] != '\0')
-            put_number(out, &sequence, i, record_digits(record, i, digits));
+            put_number(out, &sequence, i, record_digits(record, i, digits), "");
     if (record->status == ASSESSMENT_SUCCEEDED)
         put_result(out, record, &sequence);
     else
@@ -209,6 +211,15 @@ static void put_deviations(struct text_out *out, int *sequence,
                 ischia_params[i].unit);
 }
 
+bool hl7_carries(const struct ischia_request *request)
+{
+    int p = 0;
+    while (p + 1 < ISCHIA_PRESET_COUNT && strcmp(request->preset, ischia_presets[p].name) != 0) p++;
+    for (int i = 0; i < ISCHIA_OPTION_COUNT; i++)
+        if (request->values.option[i] != ischia_presets[p].option[i]) return false;
+    return true;
+}
+
 void hl7_put_request(struct text_out *out, const struct hl7_sender *sender,
                      const struct ischia_request *request)
 {
@@ -221,11 +232,12 @@ void hl7_put_request(struct text_out *out, const struct hl7_sender *sender,
     hl7_put_text(out, request->subject);
     put(out, "\rOBR|1|||tissue-strain^Tissue strain under one ischium^" HL7_SYSTEM "|||%s\r", time);
     for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
-        put_number(out, &sequence, i, text_from_number(request->values.param[i], digits));
+        put_number(out, &sequence, i, text_from_number(request->values.param[i], digits), time);
     if (request->side != ISCHIA_SIDE_NONE)
         put_text_observation(out, &sequence, "side", "Side", ischia_side_names[request->side]);
     if (request->label[0] != '\0')
         put_text_observation(out, &sequence, "label", "Label", request->label);
     put_text_observation(out, &sequence, "resolution", "Resolution", resolution);
+    put_text_observation(out, &sequence, "model", "Model", request->preset);
     if (request->has_sd) put_deviations(out, &sequence, request);
 }

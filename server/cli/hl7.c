@@ -28,6 +28,10 @@ static enum ischia_code make_message(const struct ischia_request *request, char 
     char now[HL7_TIME_BYTES], control_id[24];
     unsigned long long random = 0;
     const time_t seconds = time(NULL);
+    CHECK(
+        hl7_carries(request), err, ISCHIA_E_INPUT,
+        "an HL7 v2 message has no place for single options of skin or model, only for the name of "
+        "a set (\"model\": \"as-published\")");
     (void)gmtime_r(&seconds, &parts);
     (void)strftime(now, sizeof now, "%Y%m%d%H%M%S+0000", &parts);
     CHECK(getrandom(&random, sizeof random, 0) == sizeof random, err, ISCHIA_E_IO,

@@ -168,6 +168,13 @@ class BadMessage(cli.Case):
         errors = self.assertEnds(run("hl7", "message", stdin=case(muM=80, F=None)), 2, 2)
         self.assertIn("standard input: muM is 80 kPa; accepted 0.5 to 30 kPa", errors)
 
+    def test_options_that_a_message_cannot_carry_are_not_left_out(self):
+        for option in ({"skin": {"mu": 100}}, {"model": {"friction": 0.2}}):
+            done = run("hl7", "message", stdin=case(**option))
+            self.assertIn("no place for single options", self.assertEnds(done, 2, 1))
+            self.assertEqual(done.stdout, b"")
+        self.assertIn(b"||as-published|", run("hl7", "message", stdin=case(model="as-published")).stdout)
+
     def test_what_is_no_message_is_not_sent(self):
         for text in ("", "garbage", HEADER):
             self.assertIn("not JSON", self.assertEnds(run("hl7", "send", "127.0.0.1:1", stdin=text), 2, 1))

@@ -262,7 +262,7 @@ class Hl7(unittest.TestCase):
         document = self.last()
         self.assertEqual((document['subject'], document['parameters']), ('cli', {**SIDE, 'F': 321}))
         shown = send(json.dumps(SIDE), 'message')
-        self.assertEqual(shown.stdout.count('OBX|'), 8)
+        self.assertEqual(shown.stdout.count('OBX|'), 7 + len(('resolution', 'model')))
         self.assertEqual(send(shown.stdout, 'send', address).returncode, 0)
         self.assertEqual(send('MSH|^~\\&|x', 'send', address).returncode, 1)
         self.assertEqual(send('{"R1": 1}', 'send', address).returncode, 2)

@@ -51,6 +51,8 @@ class Integration(unittest.TestCase):
                      'PATH': os.path.dirname(ISCHIA) + ':' + os.environ['PATH']})
         self.assertEqual(done.returncode, 0, done.stdout[-2000:] + done.stderr)
         self.assertIn('MSA|AA|', done.stdout)
+        message = next(block for block in blocks('') if block.startswith('MSH|'))
+        self.assertIn(message.partition('\n')[2], done.stdout, 'is what `ischia hl7 message` prints')
         self.assertIn('\nfinal\n', done.stdout)
         self.assertIn('"indicator"', done.stdout)
 

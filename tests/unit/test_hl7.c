@@ -116,6 +116,10 @@ static void test_a_request_is_read_back(void **state)
     request.side = ISCHIA_SIDE_RIGHT;
     request.values.resolution = ISCHIA_FINE;
     (void)snprintf(request.label, sizeof request.label, "a|b");
+    (void)snprintf(request.measured_at, sizeof request.measured_at, "2026-03-01");
+    (void)snprintf(request.preset, sizeof request.preset, "%s", ischia_presets[1].name);
+    memcpy(request.values.option, ischia_presets[1].option, sizeof request.values.option);
+    assert_true(hl7_carries(&request));
     request.has_sd = true;
     request.sd[ISCHIA_R2] = 10.6;
     request.sd[ISCHIA_F] = 25;
@@ -127,10 +131,24 @@ static void test_a_request_is_read_back(void **state)
     assert_int_equal(input.request.side, ISCHIA_SIDE_RIGHT);
     assert_int_equal(input.request.values.resolution, ISCHIA_FINE);
     assert_string_equal(input.request.label, "a|b");
+    assert_string_equal(input.request.measured_at, "2026-03-01");
+    assert_string_equal(input.request.preset, ischia_presets[1].name);
+    assert_memory_equal(input.request.values.option, request.values.option,
+                        sizeof request.values.option);
     assert_true(input.request.has_sd && !input.request.sd_typical);
     assert_memory_equal(input.request.sd, request.sd, sizeof request.sd);
     assert_string_equal(input.head.control_id, "17");
     text_out_finish(&out);
+}
+
+static void test_single_options_have_no_place(void **state)
+{
+    struct ischia_request request;
+    (void)state;
+    ischia_request_init(&request);
+    assert_true(hl7_carries(&request));
+    request.values.option[ISCHIA_SKIN_MU] += 1;
+    assert_false(hl7_carries(&request));
 }
 
 /* ids of Observations are made of codes and read back; no two codes give the same. */
@@ -161,6 +179,7 @@ int main(void)
         cmocka_unit_test(test_what_is_no_message),
         cmocka_unit_test(test_times),
         cmocka_unit_test(test_a_request_is_read_back),
+        cmocka_unit_test(test_single_options_have_no_place),
         cmocka_unit_test(test_measures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
