@@ -122,14 +122,14 @@ const char *case_doc_nearest_key(const char *key)
 {
     char buffer[8];
     const char *name = without_greek(key, buffer), *nearest = NULL;
-    int least = strlen(name) <= 3 ? 2 : 3; /* one slip in a short key, two in a longer one */
+    int least = TEXT_NO_SLIP;
     for (size_t i = 0; i < sizeof synonyms / sizeof synonyms[0]; i++)
         if (text_distance(name, synonyms[i].word) == 0) return synonyms[i].key;
     for (int i = 0; i < KEY_COUNT; i++) {
         if (is_beginning(name, case_key_name(i))) return case_key_name(i);
-        const int distance = text_distance(name, case_key_name(i));
-        if (distance >= least || distance >= (int)strlen(name)) continue;
-        least = distance;
+        const int slips = text_slips(name, case_key_name(i));
+        if (slips >= least) continue;
+        least = slips;
         nearest = case_key_name(i);
     }
     return nearest;

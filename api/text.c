@@ -404,3 +404,12 @@ int text_distance(const char *a, const char *b)
         }
     return d[m][n];
 }
+
+int text_slips(const char *typed, const char *word)
+{
+    typed += strspn(typed, "-");
+    word += strspn(word, "-");
+    const int length = (int)strlen(typed), distance = text_distance(typed, word);
+    const int most = length <= 3 ? 1 : 2;
+    return distance <= most && distance < length ? distance : TEXT_NO_SLIP;
+}

@@ -77,4 +77,9 @@ bool text_is_pseudonym(const char *text);
 enum { TEXT_DISTANCE_LENGTH_MAX = 32 };
 int text_distance(const char *a, const char *b);
 
+/* How many slips make `typed` of `word`: one is allowed in up to three letters, two in more, and
+ * hyphens in front are no letters. TEXT_NO_SLIP: it is another word. */
+enum { TEXT_NO_SLIP = TEXT_DISTANCE_LENGTH_MAX };
+int text_slips(const char *typed, const char *word);
+
 #endif

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "api/text.h"
 #include "server/auth.h"
 #include "server/log.h"
 #include "server/peers.h"
@@ -253,32 +254,6 @@ struct config config_default(void)
     return config;
 }
 
-static size_t smallest(size_t a, size_t b, size_t c)
-{
-    const size_t ab = a < b ? a : b;
-    return ab < c ? ab : c;
-}
-
-/* Levenshtein's distance, one row at a time; words longer than the row are told apart as far. */
-static size_t distance(const char *a, const char *b)
-{
-    enum { LONGEST = 48 };
-    const size_t n = strlen(b);
-    size_t row[LONGEST + 1];
-    if (n > LONGEST || strlen(a) > LONGEST) return SIZE_MAX;
-    for (size_t j = 0; j <= n; j++) row[j] = j;
-    for (size_t i = 0; a[i] != '\0'; i++) {
-        size_t diagonal = row[0];
-        row[0] = i + 1;
-        for (size_t j = 0; j < n; j++) {
-            const size_t above = row[j + 1];
-            row[j + 1] = smallest(above + 1, row[j] + 1, diagonal + (a[i] != b[j]));
-            diagonal = above;
-        }
-    }
-    return row[n];
-}
-
 static const struct config_option *find_option(const char *name)
 {
     for (size_t i = 0; i < config_option_count; i++)
@@ -288,15 +263,15 @@ static const struct config_option *find_option(const char *name)
 
 static const char *nearest_name(const char *name)
 {
-    size_t best = SIZE_MAX;
+    int least = TEXT_NO_SLIP;
     const char *nearest = "";
     for (size_t i = 0; i < config_option_count; i++) {
-        const size_t d = distance(name, config_options[i].name);
-        if (d >= best) continue;
-        best = d;
+        const int slips = text_slips(name, config_options[i].name);
+        if (slips >= least) continue;
+        least = slips;
         nearest = config_options[i].name;
     }
-    return best <= 4 ? nearest : "";
+    return nearest;
 }
 
 enum ischia_code config_find(const char *name, const struct config_option **ret,
@@ -584,6 +559,12 @@ void config_print(const struct config *config, FILE *out)
     }
 }
 
+/* "none" would be a word that some options take. */
+static const char *default_words(const struct config_option *option)
+{
+    return option->default_text[0] == '\0' ? "empty" : option->default_text;
+}
+
 static void print_flag(FILE *out, const char *name)
 {
     for (; *name != '\0'; name++) (void)fputc(*name == '_' ? '-' : *name, out);
@@ -598,9 +579,7 @@ void config_print_help(FILE *out)
         (void)fputs("  --", out);
         print_flag(out, option->name);
         if (accepted[0] != '\0') (void)fprintf(out, "  (%s)", accepted);
-        (void)fprintf(out, "  [%s]\n      %s\n",
-                      option->default_text[0] == '\0' ? "none" : option->default_text,
-                      option->help);
+        (void)fprintf(out, "  [%s]\n      %s\n", default_words(option), option->help);
     }
 }
 
@@ -612,8 +591,7 @@ void config_print_man(FILE *out)
         accepted_text(option, accepted, sizeof accepted);
         (void)fprintf(out, ".TP\n.B %s\n%s\n", option->name, option->help);
         if (accepted[0] != '\0') (void)fprintf(out, "Accepted: %s.\n", accepted);
-        (void)fprintf(out, "Default: %s.%s\n",
-                      option->default_text[0] == '\0' ? "none" : option->default_text,
+        (void)fprintf(out, "Default: %s.%s\n", default_words(option),
                       option->reloadable ? " SIGHUP applies a new value." : "");
     }
 }

@@ -53,11 +53,11 @@ static int unknown_command(const char *name)
 {
     char shown[60];
     const struct command *nearest = NULL;
-    int least = 4;
+    int least = TEXT_NO_SLIP;
     for (int i = 0; i < COMMAND_COUNT; i++) {
-        const int distance = text_distance(name, commands[i].name);
-        if (distance >= least) continue;
-        least = distance;
+        const int slips = text_slips(name, commands[i].name);
+        if (slips >= least) continue;
+        least = slips;
         nearest = &commands[i];
     }
     (void)fprintf(stderr, "ischia: %s is not a command%s%s%s; see ischia help\n",

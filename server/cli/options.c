@@ -34,11 +34,11 @@ static enum cli_parse bad_usage(const struct cli_usage *usage, const char *word,
 static enum cli_parse unknown_option(const struct cli_usage *usage, const char *word)
 {
     char hint[80] = "";
-    int least = 4;
+    int least = TEXT_NO_SLIP;
     for (const struct cli_option *o = usage->options; o->name != NULL; o++) {
-        const int distance = text_distance(word, o->name);
-        if (distance >= least) continue;
-        least = distance;
+        const int slips = text_slips(word, o->name);
+        if (slips >= least) continue;
+        least = slips;
         (void)snprintf(hint, sizeof hint, "; did you mean %s?", o->name);
     }
     return bad_usage(usage, word, "is not an option", hint);

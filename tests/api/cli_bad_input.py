@@ -199,6 +199,8 @@ class BadUsage(cli.Case):
         self.assertIn("accepted standard, fine, coarse",
                       self.assertEnds(run("solve", "--resolution", "x", stdin=case()), 2, 1))
         self.assertEqual(run().returncode, 2)
+        for other in (["foo"], ["solve", "--foo"]):
+            self.assertNotIn("did you mean", self.assertEnds(run(*other), 2, 1))
 
     def test_help(self):
         self.assertIn(b"Usage: ischia study merge", run("help", "study", "merge").stdout)

@@ -227,6 +227,16 @@ static void distances(void **state)
                      TEXT_DISTANCE_LENGTH_MAX);
 }
 
+static void slips_are_few(void **state)
+{
+    (void)state;
+    assert_int_equal(text_slips("--vut", "--vtu"), 1);
+    assert_int_equal(text_slips("sovle", "solve"), 1);
+    assert_int_equal(text_slips("foo", "hl7"), TEXT_NO_SLIP);
+    assert_int_equal(text_slips("--hel", "--vtu"), TEXT_NO_SLIP);
+    assert_int_equal(text_slips("", "F"), TEXT_NO_SLIP);
+}
+
 static void a_text_grows(void **state)
 {
     struct text_out out;
@@ -257,6 +267,7 @@ int main(void)
         cmocka_unit_test(dates_are_real),
         cmocka_unit_test(pseudonyms),
         cmocka_unit_test(distances),
+        cmocka_unit_test(slips_are_few),
         cmocka_unit_test(a_text_grows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
