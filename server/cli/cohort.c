@@ -343,8 +343,9 @@ int command_cohort(int argc, char **argv)
         {"--model", 0, "NAME", "a named set of model options, for a file without that column",
          &options.defaults.model, NULL},
         {"--sd", 0, "typical",
-         "intervals, by the usual uncertainty of measurements, for a file without that column", &sd,
-         NULL},
+         "intervals, by the usual uncertainty of measurements, for a file\n"
+         "                             without that column",
+         &sd, NULL},
         {"--emulator", 0, "FILE", "a trained emulator instead of the installed one, for intervals",
          &options.emulator, NULL},
         {0},

@@ -177,9 +177,11 @@ int command_hl7(int argc, char **argv)
     const struct cli_usage usage = {
         .command = "hl7",
         .synopsis = "send HOST:PORT [FILE|-] | message [FILE|-]",
-        .about = "message: one side (JSON) as an ORU^R01. send: that, or a message that FILE holds "
-                 "already, over MLLP; the acknowledgement is printed, and the exit status is 0 for "
-                 "AA and 1 for AE and AR.",
+        .about = "message prints one side (JSON) as an ORU^R01. send sends that, or a message that "
+                 "FILE\n"
+                 "holds already, over MLLP without TLS, and prints the acknowledgement; the exit "
+                 "status\n"
+                 "is 0 for AA and 1 for AE and AR.",
         .options = table,
         .operands_max = 3,
     };

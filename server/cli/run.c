@@ -19,7 +19,8 @@ int report_error(const char *command, const struct ischia_error *err)
     const char *more = advice[err->code] != NULL ? advice[err->code] : "";
     (void)fprintf(stderr, "ischia %s: %s%s\n", command,
                   text_printable(err->message, shown, sizeof shown), more);
-    const bool input = err->code == ISCHIA_E_INPUT || err->code == ISCHIA_E_LIMIT;
+    const bool input = err->code == ISCHIA_E_INPUT || err->code == ISCHIA_E_LIMIT ||
+                       err->code == ISCHIA_E_STATE; /* another file, or another moment, will do */
     return input ? EXIT_BAD_INPUT : EXIT_SOLVE_FAILED;
 }
 

@@ -123,9 +123,9 @@ int command_solve(int argc, char **argv)
         .synopsis = "[FILE|-]",
         .about = "Solves one side. FILE is a JSON object with R1, R2, eM, eF, muM, muF and F\n"
                  "(standard input when it is - or left out). The result object goes to standard\n"
-                 "output; a result that did not converge has null for what is not known. With "
-                 "\"sd\" (an\n"
-                 "object of standard deviations, or \"typical\") it says how uncertain it is.",
+                 "output; a result that did not converge has null for what is not known. With\n"
+                 "\"sd\" (an object of standard deviations, or \"typical\") it says how uncertain\n"
+                 "it is.",
         .options = table,
         .operands_max = 1,
     };

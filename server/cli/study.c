@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "server/cli/files.h"
+#include "server/cli/run.h"
 
 struct sub_command {
     const char *name;
@@ -25,10 +26,27 @@ enum { SUB_COMMANDS = sizeof sub_commands / sizeof sub_commands[0] };
 
 static void print_help(FILE *out)
 {
-    (void)fputs("usage: ischia study COMMAND ...\n\n", out);
+    (void)fputs("Usage: ischia study COMMAND [OPTION]...\n\nCommands:\n", out);
     for (int i = 0; i < SUB_COMMANDS; i++)
         (void)fprintf(out, "  %-10s %s\n", sub_commands[i].name, sub_commands[i].help);
-    (void)fputs("\n`ischia study COMMAND --help` says more.\n", out);
+    (void)fputs("\nischia study COMMAND --help shows its options.\n"
+                "Exit status: 0 done, 1 a solve failed, 2 bad input or usage.\n",
+                out);
+}
+
+static int unknown_command(const char *name)
+{
+    char shown[60], hint[60] = "";
+    int least = TEXT_NO_SLIP;
+    for (int i = 0; i < SUB_COMMANDS; i++) {
+        const int slips = text_slips(name, sub_commands[i].name);
+        if (slips >= least) continue;
+        least = slips;
+        (void)snprintf(hint, sizeof hint, "; did you mean %s?", sub_commands[i].name);
+    }
+    (void)fprintf(stderr, "ischia study: %s is not a command%s; see ischia study --help\n",
+                  text_printable(name, shown, sizeof shown), hint);
+    return EXIT_BAD_INPUT;
 }
 
 int command_study(int argc, char **argv)
@@ -40,20 +58,15 @@ int command_study(int argc, char **argv)
     }
     for (int i = 0; i < SUB_COMMANDS; i++)
         if (strcmp(name, sub_commands[i].name) == 0) return sub_commands[i].run(argc - 1, argv + 1);
-    char shown[60];
-    if (argc > 1)
-        (void)fprintf(stderr, "ischia study: there is no command \"%s\"\n",
-                      text_printable(name, shown, sizeof shown));
-    print_help(stderr);
-    return EXIT_BAD_INPUT;
+    if (argc < 2) print_help(stderr);
+    return argc < 2 ? EXIT_BAD_INPUT : unknown_command(name);
 }
 
 int study_failed(const char *what, const struct ischia_error *err)
 {
-    (void)fprintf(stderr, "ischia study %s: %s\n", what, err->message);
-    const bool bad_input =
-        err->code == ISCHIA_E_INPUT || err->code == ISCHIA_E_STATE || err->code == ISCHIA_E_LIMIT;
-    return bad_input ? EXIT_BAD_INPUT : EXIT_SOLVE_FAILED;
+    char command[40];
+    (void)snprintf(command, sizeof command, "study %s", what);
+    return report_error(command, err);
 }
 
 enum ischia_code study_load_plan(struct study_plan *ret, const char *path,
@@ -72,6 +85,8 @@ enum ischia_code study_load_plan(struct study_plan *ret, const char *path,
     for (size_t i = 0; i < faults.count; i++)
         (void)fprintf(stderr, "ischia study: %s: %s: %s\n", file_name(path), faults.item[i].pointer,
                       text_printable(faults.item[i].detail, shown, sizeof shown));
+    if (faults.dropped > 0)
+        (void)fprintf(stderr, "ischia study: %s: and %zu more\n", file_name(path), faults.dropped);
     CHECK(faults.count == 0, err, ISCHIA_E_INPUT, "%s is not a design that can be run",
           file_name(path));
     return ISCHIA_OK;

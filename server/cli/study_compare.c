@@ -387,6 +387,8 @@ static enum ischia_code run_comparison(struct comparison *c, struct ischia_error
     const struct arguments *a = c->arguments;
     TRY(file_out_check(a->output, a->file, 2, err));
     TRY(file_out_check(a->joined, a->file, 2, err));
+    CHECK(a->output == NULL || a->joined == NULL || strcmp(a->output, a->joined) != 0, err,
+          ISCHIA_E_INPUT, "--output and --table both name %s", a->output);
     for (int f = 0; f < a->files; f++) TRY(study_table_read(&c->table[f], a->file[f], err));
     TRY(join(c, err));
     TRY(compare_all(c, err));

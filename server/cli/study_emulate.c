@@ -325,7 +325,8 @@ static void print_parameters(const struct emulation *e, int degree)
 {
     const struct emulator *fit = &e->fit[degree - 1];
     char name[DESIGN_NAME_BYTES];
-    (void)printf("\n  %-16s %9s  %9s  %9s\n", "parameter", "S_i %", "total %", "printed %");
+    (void)printf("\n  %-16s %9s  %9s%s\n", "parameter", "S_i %", "total %",
+                 e->has_published ? "  printed %" : "");
     for (int f = 0; f < e->factor_count; f++) {
         const double percent = printed_percent(e, degree, f);
         (void)printf("  %-16s %9.2f  %9.2f", design_factor_name(&e->factor[f], name),

@@ -106,8 +106,8 @@ static enum cli_parse parse_arguments(int argc, char **argv, struct arguments *a
         {"--resolution", 0, "NAME", "standard, fine or coarse, likewise", &a->defaults.resolution,
          NULL},
         {"--shard", 0, "I/N",
-         "every Nth side from side I on, a side being the rows that "
-         "differ in F alone; `ischia study merge` joins shards",
+         "every Nth side from side I on, a side being the rows that differ\n"
+         "                             in F alone; `ischia study merge` joins shards",
          &shard, NULL},
         {"--points", 0, NULL, "write the points and solve nothing", NULL, &a->points},
         {"--quiet", 'q', NULL, "no progress on stderr", NULL, &a->quiet},
@@ -233,8 +233,8 @@ static enum ischia_code row_answered(struct study *s, const struct crew_answer *
 {
     const size_t row = (size_t)answer->job;
     struct text_out text;
-    CHECK(answer->code != ISCHIA_E_MEMORY, err, ISCHIA_E_MEMORY,
-          "row %zu: %.400s; use fewer processes (-j)", row + 1, answer->message);
+    CHECK(answer->code != ISCHIA_E_MEMORY, err, ISCHIA_E_MEMORY, "row %zu: %.400s", row + 1,
+          answer->message);
     if (answer->code == ISCHIA_E_STATE && !s->died[row]) {
         const struct crew_order order = {.c = design_case(&s->plan.design, &s->plan.points, row)};
         s->died[row] = true;

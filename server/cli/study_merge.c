@@ -51,13 +51,16 @@ static void unix_line_ends(char *text)
     *to = '\0';
 }
 
-static enum ischia_code take_lines(struct merge *m, const char *path, char *text,
+static enum ischia_code take_lines(struct merge *m, const char *path, char *text, size_t length,
                                    struct ischia_error *err)
 {
     const size_t header = strlen(m->header);
+    const bool ended = length > 0 && text[length - 1] == '\n';
     unix_line_ends(text);
     CHECK(strncmp(text, m->header, header) == 0, err, ISCHIA_E_INPUT,
           "%s does not have the columns of the design", path);
+    /* Half a number is a number too. */
+    CHECK(ended, err, ISCHIA_E_INPUT, "%s ends within a line: a part of it is missing", path);
     char *rest = text + header;
     for (char *line; (line = strsep(&rest, "\n")) != NULL;)
         if (line[0] != '\0') TRY(take_line(m, path, line, err));
@@ -69,7 +72,7 @@ static enum ischia_code take_shard(struct merge *m, const char *path, struct isc
     char *text;
     size_t length;
     TRY(file_read(path, SHARD_BYTES_MAX, &text, &length, err));
-    const enum ischia_code code = take_lines(m, path, text, err);
+    const enum ischia_code code = take_lines(m, path, text, length, err);
     free(text);
     return code;
 }

@@ -352,6 +352,16 @@ class Shards(InTemporaryFolder):
         ).stderr
         self.assertIn("another result", said)
 
+    def test_a_shard_that_was_cut_off_is_refused(self):
+        design = ROOT / "examples/design_table1_composite.json"
+        shard, cut = self.path / "a.csv", self.path / "cut.csv"
+        run("factorial", design, "-o", shard, "-q", status=1)
+        for missing in (1, 4):  # the line's end alone, and digits of its last number
+            cut.write_bytes(shard.read_bytes()[:-missing])
+            said = run("merge", design, cut, "-o", self.path / "m.csv", status=2).stderr
+            self.assertIn(f"{cut} ends within a line", said)
+        self.assertFalse((self.path / "m.csv").exists())
+
     def test_bad_shards_are_bad_usage(self):
         for shard in ("0/3", "4/3", "1", "1/", "x/2", "1/2x"):
             run("factorial", TABLE1, "-o", self.path / "o.csv", "--shard", shard, status=2)
@@ -558,6 +568,10 @@ class Files(InTemporaryFolder):
             before = design.read_bytes(), results.read_bytes()
             self.assertIn("is the input", run(*arguments, status=2).stderr)
             self.assertEqual((design.read_bytes(), results.read_bytes()), before)
+        both = self.path / "both"
+        said = run("compare", results, "-o", both, "--table", both, status=2).stderr
+        self.assertIn("--output and --table both name", said)
+        self.assertFalse(both.exists())
 
     def test_where_a_result_cannot_go_is_said_before_the_work(self):
         said = run("factorial", TABLE1, "-o", self.path, status=2).stderr
@@ -596,7 +610,11 @@ class Help(unittest.TestCase):
             self.assertIn(command, listed)
             self.assertIn("Usage: ischia study " + command, run(command, "--help").stdout)
         run(status=2)
-        self.assertIn('no command "fit"', run("fit", status=2).stderr)
+        self.assertEqual(
+            run("fit", status=2).stderr,
+            "ischia study: fit is not a command; see ischia study --help\n",
+        )
+        self.assertIn("did you mean merge?", run("mreg", status=2).stderr)
 
 
 unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
