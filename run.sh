@@ -12,10 +12,17 @@ install_packages build
 [[ -f build/release/build.ninja ]] || CC=${CC:-gcc} meson setup build/release --buildtype=release
 ninja -C build/release server/ischiad server/cli/ischia
 
-build/release/server/ischiad --listen "$listen" --state-dir data &
+says=$(mktemp -u)
+mkfifo -m 600 "$says"
+build/release/server/ischiad --listen "$listen" --state-dir data >"$says" &
 service=$!
+exec {said}<"$says"
+rm "$says"
 trap 'kill -TERM "$service" 2>/dev/null; wait "$service"' EXIT
-python3 deploy/first_side.py "http://$listen" examples/table2_1R.json ||
+# "listening on http://…": one that cannot start has said why, and whatever else answers there is
+# not asked.
+read -r _ _ address <&"$said" || { wait "$service" || exit; }
+python3 deploy/first_side.py "$address" examples/table2_1R.json ||
   echo "There was no result; the service stays, its log is above." >&2
 trap 'kill -TERM "$service" 2>/dev/null' INT TERM
 wait "$service"

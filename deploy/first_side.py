@@ -5,6 +5,7 @@
 Usage: first_side.py ADDRESS FILE.json
 """
 import json
+import signal
 import sys
 import time
 import urllib.error
@@ -18,15 +19,24 @@ def ask(address, path, body=None):
         return json.load(response)
 
 
-def await_service(address, seconds=60):
+def await_worker(address, seconds=60):
+    """503 means: not yet."""
     end = time.monotonic() + seconds
     while True:
         try:
             return ask(address, '/readyz')
-        except (urllib.error.URLError, ConnectionError):
-            if time.monotonic() > end:
+        except urllib.error.HTTPError as refusal:
+            if refusal.code != 503 or time.monotonic() > end:
                 raise
             time.sleep(0.2)
+
+
+def words_of(refusal):
+    """The detail of its problem document, or what HTTP says."""
+    try:
+        return json.load(refusal)['detail']
+    except (ValueError, KeyError, TypeError):
+        return refusal.reason
 
 
 def show(document):
@@ -57,9 +67,8 @@ def show(document):
     return 0
 
 
-def main():
-    address, path = sys.argv[1:3]
-    await_service(address)
+def submit(address, path):
+    await_worker(address)
     with open(path, 'rb') as file:
         document = ask(address, '/v1/assessments', file.read())
     while document['status'] in ('queued', 'running'):
@@ -72,6 +81,18 @@ def main():
         flush=True,
     )
     return status
+
+
+def main():
+    address, path = sys.argv[1:3]
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without more words
+    try:
+        return submit(address, path)
+    except urllib.error.HTTPError as refusal:
+        print(f'{address} answers {refusal.code}: {words_of(refusal)}', file=sys.stderr)
+    except OSError as fault:
+        print(f'{address} does not answer: {fault}', file=sys.stderr)
+    return 1
 
 
 if __name__ == '__main__':
