@@ -18,13 +18,14 @@ from cluster import Cluster, programs  # noqa: E402  (the path comes first)
 from service import PATIENCE_S, PROGRAM, Service, admin, eventually  # noqa: E402
 
 
-def backup(state, folder, keep=None, program=PROGRAM):
+def backup(state, folder, keep=None, program=PROGRAM, **variables):
     """Runs the script as its unit does; returns what it said."""
     config = os.path.join(folder, 'ischiad.conf')
     with open(config, 'w', encoding='utf-8') as file:
         file.write(f'state_dir = {state}\n')
     words = [os.path.join(DEPLOY, 'backup/ischia-backup'), folder, *([str(keep)] if keep else [])]
-    environment = {**os.environ, 'ISCHIAD': program, 'ISCHIA_CONFIG_FILE': config}
+    environment = {**os.environ, 'ISCHIAD': program, 'ISCHIA_CONFIG_FILE': config,
+                   **variables}
     return subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S,
                           env=environment)
 
@@ -90,6 +91,18 @@ class Drill(unittest.TestCase):
             kept = copies(folder)
             self.assertEqual(kept[:2], [f'ischia-2020-01-0{i}T000000Z.db' for i in (3, 4)])
             self.assertEqual(len(kept), 3)
+
+    def test_the_trial_never_goes_into_the_store_that_the_environment_names(self):
+        with Service() as service, tempfile.TemporaryDirectory() as folder:
+            service.until_ready()
+            later = os.path.join(folder, 'later')  # something happens between the copy and its trial
+            with open(later, 'w', encoding='utf-8') as file:
+                file.write(f'#!/bin/sh\n"{PROGRAM}" "$@" || exit\ncase $3 in backup) '
+                           f'"{PROGRAM}" --state-dir "{service.state}" token create name=later ;; esac\n')
+            os.chmod(later, 0o700)
+            said = backup(service.state, folder, program=later, ISCHIA_STORE=service.state)
+            self.assertEqual(said.returncode, 0, said.stderr)
+            self.assertIn('later', admin(service.state, 'token', 'list'))
 
     def test_a_copy_that_fails_the_trial_is_set_apart_and_nothing_is_thrown_away(self):
         with Service() as service, tempfile.TemporaryDirectory() as folder:
