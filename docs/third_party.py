@@ -15,8 +15,8 @@ HEAD = """# Third-party software
 
 Everything that Ischia is built from, linked with or tested by, as packages of Debian 12 (whose
 `/usr/share/doc/PACKAGE/copyright` has the full text). Written by `docs/third_party.py` from
-`deploy/packages.txt`; do not edit. All of it is compatible with GPL-3.0-or-later
-(`docs/decisions/0001-licence-gpl3.md`); tools are run, not linked.
+`deploy/packages.txt`; do not edit. What the programs and the page are linked with is compatible with
+GPL-3.0-or-later (`docs/decisions/0001-licence-gpl3.md`); tools are run, not linked.
 
 The clinic page is bundled from npm packages: `static/package-lock.json` names them and their
 versions, and the built `assets/licences.txt`, which the daemon serves, has the full licence text of
