@@ -3,7 +3,8 @@
 """How many machines for how many people, and what would break first: writes the tables of
 docs/CAPACITY.md from measured figures, by simulating a day's busiest hour event by event.
 
-usage: capacity.py [--check] [NAME=VALUE...]    --check only compares; capacity.py --help lists NAMEs
+usage: capacity.py [--check | NAME=VALUE...]    --check only compares; with other figures the page goes
+                                                to standard output; capacity.py --help lists NAMEs
 
 An assessment goes: accepted (a transaction) -> waits, clinics before studies -> claimed (a
 transaction) -> solved on one core -> stored (a transaction, with its field) -> read. Transactions
@@ -281,21 +282,33 @@ def page(figures):
     return text
 
 
-def main(words):
+def usage():
+    return "usage: capacity.py [--check | NAME=VALUE...]\n" + "\n".join(
+        f"  {name:15} {value:g} {unit}: {what}".replace(" :", ":") for name, (value, unit, what) in FIGURES.items())
+
+
+def other_figures(words):
+    """FIGURES' values with those that the words give."""
     figures = {name: value for name, (value, _, _) in FIGURES.items()}
     for word in words:
-        name, equals, value = word.partition("=")
-        if equals and name in figures:
-            figures[name] = float(value)
-        elif word != "--check":
-            sys.exit("usage: capacity.py [--check] [NAME=VALUE...]\n" + "\n".join(
-                f"  {n:15} {v:g} {u}: {w}" for n, (v, u, w) in FIGURES.items()))
-    text = page(figures)
-    if "--check" not in words:
-        PAGE.write_text(text, encoding="utf-8")
-    elif text != PAGE.read_text(encoding="utf-8"):
-        print("docs/CAPACITY.md is not what docs/capacity.py writes: run it")
-        return 1
+        name, _, value = word.partition("=")
+        if name not in FIGURES or not re.fullmatch(r"\d+(\.\d+)?", value):
+            sys.exit(usage())
+        figures[name] = float(value)
+    return figures
+
+
+def main(words):
+    if words == ["--help"]:
+        print(usage())
+    elif words == ["--check"]:
+        if page(other_figures([])) != PAGE.read_text(encoding="utf-8"):
+            print("docs/CAPACITY.md is not what docs/capacity.py writes: run it")
+            return 1
+    elif words:
+        print(page(other_figures(words)), end="")
+    else:
+        PAGE.write_text(page(other_figures([])), encoding="utf-8")
     return 0
 
 

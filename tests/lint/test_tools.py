@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""link_sets.py and tidy.py catch what they are for, on programs and sources made here."""
+"""link_sets.py and tidy.py catch what they are for, on programs and sources made here; and what
+docs/capacity.py is asked it does not write."""
 import json
 import subprocess
 import tempfile
@@ -62,6 +63,16 @@ class Tools(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertIn("bugprone-suspicious-string-compare", text)
         self.assertEqual(self.tidy(USES_NOTHING)[0], 0)
+
+    def test_other_figures_leave_the_page_of_capacity_alone(self):
+        for name in ("capacity.py", "CAPACITY.md"):
+            (self.root / name).write_bytes((HERE.parents[1] / "docs" / name).read_bytes())
+        before = (self.root / "CAPACITY.md").read_text(encoding="utf-8")
+        status, text = run("/usr/bin/python3", self.root / "capacity.py", "cores=64")
+        self.assertEqual(status, 0, text)
+        self.assertIn("machines of 64 cores", text)
+        self.assertEqual((self.root / "CAPACITY.md").read_text(encoding="utf-8"), before)
+        self.assertNotIn("Traceback", run("/usr/bin/python3", self.root / "capacity.py", "cores=x")[1])
 
 
 if __name__ == "__main__":
