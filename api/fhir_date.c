@@ -63,11 +63,12 @@ static bool time_of_day(const char *at, int64_t *lo, int64_t *ret_length)
     if (!number(&at, 2, 0, 23, &hour) || !take(&at, ':') || !number(&at, 2, 0, 59, &minute))
         return false;
     *ret_length = MS_PER_MINUTE;
-    if (take(&at, ':')) {
+    const bool to_the_second = take(&at, ':');
+    if (to_the_second) {
         if (!number(&at, 2, 0, 60, &second)) return false;
         *ret_length = MS_PER_SECOND;
     }
-    if (take(&at, '.')) {
+    if (to_the_second && take(&at, '.')) {
         int scale = 100, digits = 0;
         for (; *at >= '0' && *at <= '9'; at++, digits++, scale /= 10)
             fraction += scale * (*at - '0');
@@ -108,7 +109,7 @@ bool fhir_date_span(const char *text, int64_t *ret_lo, int64_t *ret_hi)
 /* 0 says that there is no bound; nothing that is looked for is older than 1970. */
 static int64_t bound(int64_t ms) { return ms < 1 ? 1 : ms; }
 
-bool fhir_date_narrow(const char *value, int64_t *lo, int64_t *hi)
+bool fhir_date_range(const char *value, int64_t *ret_lo, int64_t *ret_hi)
 {
     static const struct {
         char name[3];
@@ -127,9 +128,7 @@ bool fhir_date_narrow(const char *value, int64_t *lo, int64_t *hi)
         p++;
     if (p == sizeof prefixes / sizeof prefixes[0]) return false;
     if (!fhir_date_span(plain ? value : value + 2, &first, &end)) return false;
-    const int64_t from = bound(prefixes[p].from_end ? end : first);
-    const int64_t until = bound(prefixes[p].until_end ? end : first);
-    if (prefixes[p].from && from > *lo) *lo = from;
-    if (prefixes[p].until && (*hi == 0 || until < *hi)) *hi = until;
+    *ret_lo = prefixes[p].from ? bound(prefixes[p].from_end ? end : first) : 0;
+    *ret_hi = prefixes[p].until ? bound(prefixes[p].until_end ? end : first) : 0;
     return true;
 }

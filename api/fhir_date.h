@@ -9,9 +9,10 @@
  * up to but not including *ret_hi. One without an offset is UTC. False when it is none. */
 bool fhir_date_span(const char *text, int64_t *ret_lo, int64_t *ret_hi);
 
-/* A date search parameter ("ge2026-03-01"; prefixes eq ge gt le lt sa eb) narrows the range
- * [*lo, *hi) of times after 1970-01-01T00:00:00Z; 0 is no bound, and one at or before that moment
- * becomes 1. False when it is malformed or of another prefix. */
-bool fhir_date_narrow(const char *value, int64_t *lo, int64_t *hi);
+/* The range of times after 1970-01-01T00:00:00Z that a date search parameter asks for
+ * ("ge2026-03-01"; prefixes eq ge gt le lt sa eb): from *ret_lo up to but not including *ret_hi. 0
+ * is no bound, and one at or before that moment becomes 1. False when it is malformed or of another
+ * prefix. */
+bool fhir_date_range(const char *value, int64_t *ret_lo, int64_t *ret_hi);
 
 #endif

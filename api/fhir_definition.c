@@ -7,7 +7,7 @@
 #include "api/fhir_write.h"
 #include "api/measure.h"
 
-#define DEFINED_AT "2026-11-22" /* when the definitions below were last changed */
+#define DEFINED_AT "2026-12-01" /* when the definitions below were last changed */
 
 static void put_head(struct json_out *out, const char *type, const char *id, const char *url,
                      const char *name, const char *title)
@@ -288,7 +288,8 @@ static const struct search_parameter {
     {"patient", "reference", "The same as subject."},
     {"date", "date", "When the solve ended; prefixes eq, gt, ge, lt, le, sa, eb."},
     {"_lastUpdated", "date", "When it last changed; the same prefixes."},
-    {"status", "token", "registered, final or cancelled; several with commas."},
+    {"status", "token", "registered, final or cancelled."},
+    {"_id", "token", "The id of the assessment."},
 };
 
 static void put_interaction(struct json_out *out, const char *code)

@@ -53,10 +53,14 @@ static enum ischia_code find_last(struct call *call, const char *patient, const 
 {
     char cursor[STORE_CURSOR_BYTES];
     struct found found = {.code = ISCHIA_OK, .err = err};
+    const struct store_alternative person = {
+        .kind = STORE_OF_PERSON, .subject = patient + strlen("Patient/"), .reference = patient};
     const struct store_filter filter = {
-        .person = {patient + strlen("Patient/"), patient},
         .side = side,
-        .states = 1U << QUEUE_SUCCEEDED,
+        .by_state = true,
+        .state = QUEUE_SUCCEEDED,
+        .alternative = &person,
+        .alternative_count = 1,
         .limit = 1,
         .with_results = true,
     };

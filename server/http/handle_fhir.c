@@ -14,7 +14,7 @@
 
 /* Reading and searching under /fhir. Resources are made from the store's rows at each request. */
 
-enum { COUNT_USUAL = 50, VALUE_BYTES = 512 };
+enum { COUNT_USUAL = 50, VALUE_BYTES = 2048 };
 
 /* ---------------------------------------------------------------------------- shared */
 
@@ -212,39 +212,60 @@ void handle_fhir_read(struct call *call, struct http_response *ret)
 /* ---------------------------------------------------------------------------- search */
 
 struct search {
-    char person[VALUE_BYTES], reference[VALUE_BYTES], cursor[STORE_CURSOR_BYTES];
-    struct uuid id;
+    char cursor[STORE_CURSOR_BYTES];
     bool nothing; /* no row can match */
     struct store_filter filter;
+    struct store_alternative alternative[STORE_ALTERNATIVES_MAX];
+    char reference[STORE_ALTERNATIVES_MAX][ORIGIN_TEXT_BYTES]; /* of a person, each its own */
+    int condition, count;  /* the one that is being read; alternatives so far   */
+    bool full;             /* there are more than have room                     */
     struct text_out query; /* what was understood, for links; without the cursor */
     struct doc_faults faults;
 };
 
+static void add(struct search *s, struct store_alternative alternative)
+{
+    alternative.condition = s->condition;
+    s->alternative[s->count++] = alternative;
+}
+
+/* Takers add what can hold of a row, if anything can. False: no value of this parameter. */
+
 static bool take_person(struct search *s, const char *value)
 {
+    static const char prefix[] = "Patient/";
     const char *id = NULL;
-    if (s->person[0] != '\0' && strcmp(s->person, value) != 0) return false;
-    const bool local = fhir_is_local_patient(value, &id);
-    (void)snprintf(s->person, sizeof s->person, "%s", local ? id : value);
-    (void)snprintf(
-        s->reference, sizeof s->reference, "%s%.480s",
-        local || strchr(value, '/') != NULL || strchr(value, ':') != NULL ? "" : "Patient/", value);
-    s->filter.person[0] = s->person;
-    s->filter.person[1] = s->reference;
+    const bool whole = fhir_is_local_patient(value, &id);
+    const bool bare = !whole && strchr(value, '/') == NULL && strchr(value, ':') == NULL;
+    char *reference = s->reference[s->count];
+    const int length = snprintf(reference, ORIGIN_TEXT_BYTES, "%s%s", bare ? prefix : "", value);
+    if (length >= ORIGIN_TEXT_BYTES) return true; /* longer than any that is kept */
+    add(s, (struct store_alternative){.kind = STORE_OF_PERSON,
+                                      .subject =
+                                          whole || bare ? reference + strlen(prefix) : reference,
+                                      .reference = reference});
     return value[0] != '\0';
+}
+
+static bool take_times(struct search *s, enum store_alternative_kind kind, const char *value)
+{
+    struct store_alternative times = {.kind = kind};
+    if (!fhir_date_range(value, &times.from_ms, &times.before_ms)) return false;
+    add(s, times);
+    return true;
 }
 
 static bool take_date(struct search *s, const char *value)
 {
-    return fhir_date_narrow(value, &s->filter.finished_from_ms, &s->filter.finished_before_ms);
+    return take_times(s, STORE_ENDED, value);
 }
 
 static bool take_last_updated(struct search *s, const char *value)
 {
-    return fhir_date_narrow(value, &s->filter.changed_from_ms, &s->filter.changed_before_ms);
+    return take_times(s, STORE_CHANGED, value);
 }
 
-/* "final,cancelled", each perhaps behind its system and a '|'. */
+/* Perhaps behind its system and a '|'. */
 static bool take_status(struct search *s, const char *value)
 {
     static const struct {
@@ -263,36 +284,22 @@ static bool take_status(struct search *s, const char *value)
         {"entered-in-error", 0},
         {"unknown", 0},
     };
-    unsigned states = 0;
-    while (*value != '\0') {
-        const size_t length = strcspn(value, ",");
-        const char *bar = memchr(value, '|', length);
-        const char *word = bar == NULL ? value : bar + 1;
-        const size_t size = length - (size_t)(word - value);
-        bool found = false;
-        for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
-            if (strlen(words[i].word) != size || strncmp(words[i].word, word, size) != 0) continue;
-            states |= words[i].states;
-            found = true;
-        }
-        if (!found) return false;
-        value += length + (value[length] == ',');
+    const char *bar = strchr(value, '|');
+    const char *word = bar == NULL ? value : bar + 1;
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
+        if (strcmp(words[i].word, word) != 0) continue;
+        if (words[i].states != 0)
+            add(s, (struct store_alternative){.kind = STORE_IN_STATES, .states = words[i].states});
+        return true;
     }
-    s->nothing = s->nothing || states == 0;
-    s->filter.states = s->filter.states == 0 ? states : s->filter.states & states;
-    s->nothing = s->nothing || s->filter.states == 0;
-    return true;
+    return false;
 }
 
 static bool take_id(struct search *s, const char *value)
 {
-    struct uuid id;
-    const bool fits = uuid_parse(value, &id) && (s->filter.id == NULL || uuid_equal(&id, &s->id));
-    s->nothing = s->nothing || !fits;
-    if (!fits) return true;
-    s->id = id;
-    s->filter.id = &s->id;
-    return true;
+    struct store_alternative known = {.kind = STORE_HAS_ID};
+    if (uuid_parse(value, &known.id)) add(s, known);
+    return value[0] != '\0';
 }
 
 static bool take_count(struct search *s, const char *value)
@@ -321,9 +328,9 @@ const char *const fhir_search_keys[] = {"subject",      "subject:Patient", "pati
                                         "_cursor",      "_format",         "_pretty", NULL};
 static const struct {
     bool (*take)(struct search *s, const char *value);
-    bool single; /* a list of values is refused; escapes are undone */
+    bool is_condition; /* one of the values between its commas has to hold; escapes are undone */
 } takers[] = {{take_person, true},   {take_person, true},       {take_person, true},
-              {take_date, true},     {take_last_updated, true}, {take_status, false},
+              {take_date, true},     {take_last_updated, true}, {take_status, true},
               {take_id, true},       {take_count, false},       {take_cursor, false},
               {take_nothing, false}, {take_nothing, false}};
 _Static_assert(sizeof takers / sizeof takers[0] + 1 ==
@@ -345,26 +352,38 @@ static void put_encoded(struct text_out *out, const char *text)
     }
 }
 
-/* FHIR's escapes undone (of ',' '$' '|' and the backslash itself). False at a comma that has none:
- * it stands between the values of a list. */
-static bool unescape_single(const char *value, char ret[VALUE_BYTES])
+/* The value up to the next comma that separates, with FHIR's escapes undone (of ',' '$' '|' and the
+ * backslash itself). Returns what follows that comma, NULL: it was the last. */
+static const char *next_value(const char *list, char ret[VALUE_BYTES])
 {
-    for (; *value != '\0' && *value != ','; value++) {
-        if (value[0] == '\\' && value[1] != '\0' && strchr(",$|\\", value[1]) != NULL) value++;
-        *ret++ = *value;
+    for (; *list != '\0' && *list != ','; list++) {
+        if (list[0] == '\\' && list[1] != '\0' && strchr(",$|\\", list[1]) != NULL) list++;
+        *ret++ = *list;
     }
     *ret = '\0';
-    return *value == '\0';
+    return *list == ',' ? list + 1 : NULL;
+}
+
+/* One of the values has to hold. */
+static bool take_list(struct search *s, int i, const char *list)
+{
+    char value[VALUE_BYTES];
+    const int before = s->count;
+    s->condition++;
+    while (list != NULL) {
+        list = next_value(list, value);
+        s->full = s->count == STORE_ALTERNATIVES_MAX;
+        if (s->full) return true;
+        if (!takers[i].take(s, value)) return false;
+    }
+    s->nothing = s->nothing || s->count == before;
+    return true;
 }
 
 static void take_value(struct search *s, int i, const char *value)
 {
-    char plain[VALUE_BYTES];
     const char *key = fhir_search_keys[i];
-    if (takers[i].single && !unescape_single(value, plain))
-        doc_faults_add(&s->faults, key, "unsupported",
-                       "%s takes one value here; a list (a comma) is not supported", key);
-    else if (!takers[i].take(s, takers[i].single ? plain : value))
+    if (!(takers[i].is_condition ? take_list(s, i, value) : takers[i].take(s, value)))
         doc_faults_add(&s->faults, key, "malformed", "%s has a value that is not accepted", key);
 }
 
@@ -432,6 +451,11 @@ static bool read_search(struct call *call, struct search *s, struct http_respons
     if (s->faults.dropped > 0 && !lenient)
         doc_faults_add(&s->faults, "query", "unsupported",
                        "a search parameter is not known here; Prefer: handling=lenient ignores it");
+    if (s->full)
+        doc_faults_add(&s->faults, "query", "too_many", "a search has at most %d values",
+                       STORE_ALTERNATIVES_MAX);
+    s->filter.alternative = s->alternative;
+    s->filter.alternative_count = s->count;
     if (s->faults.count == 0) return true;
     problem_init(&problem, PROBLEM_BAD_REQUEST, "The search is not acceptable.");
     problem.faults = s->faults;
@@ -459,6 +483,7 @@ static bool write_entry(void *context, const struct store_assessment *row)
     if (page->code != ISCHIA_OK) return false;
     (void)snprintf(url, sizeof url, "%s/%s/%s", page->base, fhir_type_names[page->type],
                    page->record->id);
+    if (page->count == 0) json_open_array(&page->out, "entry"); /* FHIR has no empty arrays */
     json_open_object(&page->out, NULL);
     json_put_string(&page->out, "fullUrl", url);
     if (page->type == FHIR_RISK_ASSESSMENT)
@@ -503,11 +528,10 @@ static enum ischia_code write_bundle(struct call *call, const struct search *s, 
     json_open_object(&page->out, NULL);
     json_put_string(&page->out, "resourceType", "Bundle");
     json_put_string(&page->out, "type", "searchset");
-    json_open_array(&page->out, "entry");
     if (!s->nothing)
         TRY(store_list(call->service->store, &s->filter, write_entry, page, cursor, &page->err));
     TRY(page->code);
-    json_close_array(&page->out);
+    if (page->count > 0) json_close_array(&page->out);
     if (cursor[0] == '\0' && s->cursor[0] == '\0')
         json_put_integer(&page->out, "total", page->count);
     json_open_array(&page->out, "link");

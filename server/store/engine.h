@@ -114,9 +114,8 @@ struct sql_text {
 extern const struct sql_text sql_text[SQL_COUNT];
 struct engine;
 const char *sql_for(const struct engine *engine, const struct sql_text *text);
-/* What a listing of assessments (store_read.c) is put together from. */
-enum sql_piece { SQL_PIECE_STATES, SQL_PIECE_CHANGED, SQL_PIECE_COUNT };
-extern const struct sql_text sql_piece[SQL_PIECE_COUNT];
+/* The conditions of a listing of assessments (store_read.c). */
+extern const struct sql_text sql_alternative[STORE_ALTERNATIVE_KIND_COUNT];
 /* The columns that read_assessment (store_read.c) expects, of "assessment a" and "solution s" and
  * "origin o". */
 extern const char *const sql_assessment_columns;
@@ -144,7 +143,8 @@ struct value {
     const void *bytes; /* VALUE_TEXT: ends in NUL */
     size_t size;       /* without the NUL */
 };
-enum { QUERY_VALUES_MAX = 20 };
+/* A listing has the most: its plain conditions and up to two values an alternative. */
+enum { QUERY_VALUES_MAX = 20 + 2 * STORE_ALTERNATIVES_MAX };
 
 /*
  * One run of a statement: put the values in order of the ?s, step, read columns, end. query_end

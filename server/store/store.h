@@ -172,20 +172,38 @@ ISCHIA_MUST_CHECK enum ischia_code
 store_get_field(struct store *store, const struct uuid *id, unsigned char **ret_bytes,
                 size_t *ret_size, enum store_answer *ret_answer, struct ischia_error *err);
 
+/* One thing that may hold of an assessment, with what of the members it takes. */
+enum store_alternative_kind {
+    STORE_HAS_ID,    /* id                                                                 */
+    STORE_OF_PERSON, /* subject, reference: either fits                                    */
+    STORE_IN_STATES, /* states                                                             */
+    STORE_ENDED,     /* from_ms, before_ms: when; what has not ended fits no bound         */
+    STORE_CHANGED,   /* from_ms, before_ms: when last                                      */
+    STORE_ALTERNATIVE_KIND_COUNT
+};
+
+struct store_alternative {
+    enum store_alternative_kind kind;
+    int condition; /* whose alternative it is; those of one stand together                */
+    struct uuid id;
+    const char *subject, *reference;
+    unsigned states;            /* bits of enum queue_state                                 */
+    int64_t from_ms, before_ms; /* 0: no bound                                              */
+};
+
+enum { STORE_ALTERNATIVES_MAX = 32 };
+
 struct store_filter {
-    const struct uuid *id; /* NULL: any                                                    */
-    const char *subject;   /* NULL: any                                                    */
-    const char *side;      /* NULL: any                                                    */
-    bool by_state;         /* false: any                                                   */
+    const char *subject; /* NULL: any                                                      */
+    const char *side;    /* NULL: any                                                      */
+    bool by_state;       /* false: any                                                     */
     enum queue_state state;
-    unsigned states;       /* bits of enum queue_state; 0: any                            */
-    const char *person[2]; /* a subject and a reference: either fits; both NULL: any      */
-    /* 0: no bound. What has not ended fits no bound on its end. */
-    int64_t finished_from_ms, finished_before_ms;
-    int64_t changed_from_ms, changed_before_ms; /* 0: no bound                          */
-    int limit;          /* 1 ... STORE_LIST_LIMIT_MAX                                     */
-    const char *cursor; /* NULL: from the newest; else what an earlier page returned      */
-    bool with_results;  /* false: result_json and problem_json stay NULL                  */
+    /* Of each condition one alternative has to hold. */
+    const struct store_alternative *alternative;
+    int alternative_count; /* at most STORE_ALTERNATIVES_MAX                               */
+    int limit;             /* 1 ... STORE_LIST_LIMIT_MAX                                   */
+    const char *cursor;    /* NULL: from the newest; else what an earlier page returned    */
+    bool with_results;     /* false: result_json and problem_json stay NULL                */
 };
 
 /* Called for each row, newest first; the row is valid during the call. False stops the listing. */
@@ -194,7 +212,8 @@ typedef bool store_on_assessment(void *context, const struct store_assessment *r
 /*
  * One page, newest first. ret_cursor is "" when this was the last page. Rows accepted after the
  * first page was read never shift the pages that follow.
- * ISCHIA_E_INPUT: the cursor is not one of ours, or limit is out of range.
+ * ISCHIA_E_INPUT: the cursor is not one of ours, limit is out of range, or there are too many
+ * alternatives.
  */
 ISCHIA_MUST_CHECK enum ischia_code
 store_list(struct store *store, const struct store_filter *filter, store_on_assessment *on_row,

@@ -17,7 +17,7 @@
 #include "server/store/store_postgresql.h"
 
 enum { OWED_MAX = 256 }; /* their answers fit into any socket's buffer */
-enum { ANSWER_MS = 20000, BEAT_ANSWER_MS = 3000, AGAIN_MS = 500, TEXT_MAX = 4096 };
+enum { ANSWER_MS = 20000, BEAT_ANSWER_MS = 3000, AGAIN_MS = 500, TEXT_MAX = 8192 };
 
 /* Writers queue here; any number of ours will do. The same in the documentation. */
 #define ORDER_LOCK "pg_advisory_xact_lock(1232298856)"

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/text.h"
 #include "server/store/engine.h"
 
 /* ------------------------------------------------------------------------ one assessment */
@@ -163,64 +164,59 @@ static bool read_cursor(const char *cursor, int64_t *ret_before)
     return true;
 }
 
-enum { LIST_TEXT_BYTES = 2048 };
-
-static bool has_person(const struct store_filter *filter)
-{
-    return filter->person[0] != NULL || filter->person[1] != NULL;
-}
-
-static bool has_times(const struct store_filter *filter)
-{
-    return filter->finished_from_ms != 0 || filter->finished_before_ms != 0 ||
-           filter->changed_from_ms != 0 || filter->changed_before_ms != 0;
-}
-
 static int64_t upper(int64_t bound_ms) { return bound_ms == 0 ? INT64_MAX : bound_ms; }
 
-/* finished_ms is 0 until the end. */
-static int64_t finished_from(const struct store_filter *filter)
+/* The values of sql_alternative. */
+static void put_alternative(struct query *query, const struct store_alternative *a)
 {
-    const bool must_have_ended = filter->finished_from_ms == 0 && filter->finished_before_ms != 0;
-    return must_have_ended ? 1 : filter->finished_from_ms;
+    switch (a->kind) {
+    case STORE_HAS_ID:
+        query_put_blob(query, a->id.byte, UUID_BYTES);
+        return;
+    case STORE_OF_PERSON:
+        query_put_text(query, a->subject);
+        query_put_text(query, a->reference);
+        return;
+    case STORE_IN_STATES:
+        query_put_integer(query, (int64_t)a->states);
+        return;
+    case STORE_ENDED: /* finished_ms is 0 until the end */
+        query_put_integer(query, a->from_ms == 0 ? 1 : a->from_ms);
+        break;
+    default:
+        query_put_integer(query, a->from_ms);
+        break;
+    }
+    query_put_integer(query, upper(a->before_ms));
 }
 
-static void put_exchange_bounds(struct query *query, const struct store_filter *filter)
+static void put_alternative_text(struct text_out *out, const struct db *db,
+                                 const struct store_filter *filter, int i)
 {
-    if (filter->states != 0) query_put_integer(query, (int64_t)filter->states);
-    if (has_person(filter)) {
-        query_put_text(query, filter->person[0]);
-        query_put_text(query, filter->person[1]);
-    }
-    if (!has_times(filter)) return;
-    query_put_integer(query, finished_from(filter));
-    query_put_integer(query, upper(filter->finished_before_ms));
-    query_put_integer(query, filter->changed_from_ms);
-    query_put_integer(query, upper(filter->changed_before_ms));
+    const struct store_alternative *a = &filter->alternative[i];
+    const bool first = i == 0 || a->condition != a[-1].condition;
+    const bool last = i + 1 == filter->alternative_count || a->condition != a[1].condition;
+    text_put_string(out, first ? " AND (" : " OR ");
+    text_put_string(out, sql_for(db->engine, &sql_alternative[a->kind]));
+    if (last) text_put_string(out, ")");
 }
 
 /* Only the conditions that are asked for: each combination then finds its index. */
-static void list_text(const struct db *db, const struct store_filter *filter,
-                      char ret[LIST_TEXT_BYTES])
+static enum ischia_code list_text(const struct db *db, const struct store_filter *filter,
+                                  char **ret, struct ischia_error *err)
 {
-    char times[256];
-    const char *changed = sql_for(db->engine, &sql_piece[SQL_PIECE_CHANGED]);
-    (void)snprintf(times, sizeof times,
-                   " AND a.finished_ms >= ? AND a.finished_ms < ? AND %s >= ? AND %s < ?", changed,
-                   changed);
-    (void)snprintf(
-        ret, LIST_TEXT_BYTES,
-        "SELECT %s FROM assessment a LEFT JOIN solution s ON s.rowid = a.solution "
-        "LEFT JOIN origin o ON o.assessment = a.seq "
-        "WHERE a.seq < ?%s%s%s%s%s%s%s ORDER BY a.seq DESC LIMIT ?",
-        sql_assessment_columns, filter->id == NULL ? "" : " AND a.id = ?",
-        filter->subject == NULL ? "" : " AND a.subject = ?",
-        filter->side == NULL ? "" : " AND a.side = ?", filter->by_state ? " AND a.state = ?" : "",
-        filter->states == 0 ? "" : sql_for(db->engine, &sql_piece[SQL_PIECE_STATES]),
-        !has_person(filter) ? ""
-                            : " AND a.seq IN (SELECT seq FROM assessment WHERE subject = ? UNION "
-                              "SELECT assessment FROM origin WHERE reference = ?)",
-        has_times(filter) ? times : "");
+    struct text_out out;
+    text_out_init(&out);
+    text_put_string(&out, "SELECT ");
+    text_put_string(&out, sql_assessment_columns);
+    text_put_string(&out, " FROM assessment a LEFT JOIN solution s ON s.rowid = a.solution "
+                          "LEFT JOIN origin o ON o.assessment = a.seq WHERE a.seq < ?");
+    if (filter->subject != NULL) text_put_string(&out, " AND a.subject = ?");
+    if (filter->side != NULL) text_put_string(&out, " AND a.side = ?");
+    if (filter->by_state) text_put_string(&out, " AND a.state = ?");
+    for (int i = 0; i < filter->alternative_count; i++) put_alternative_text(&out, db, filter, i);
+    text_put_string(&out, " ORDER BY a.seq DESC LIMIT ?");
+    return text_out_take(&out, ret, NULL, err);
 }
 
 struct listing {
@@ -264,19 +260,20 @@ static enum ischia_code list_from(struct db *db, struct listing *listing, int64_
                                   struct ischia_error *err)
 {
     const struct store_filter *filter = listing->filter;
-    char text[LIST_TEXT_BYTES];
-    list_text(db, filter, text);
+    char *text = NULL;
     struct query query;
+    TRY(list_text(db, filter, &text, err));
     query_begin_text(&query, db, text);
     query_put_integer(&query, before);
-    if (filter->id != NULL) query_put_blob(&query, filter->id->byte, UUID_BYTES);
     if (filter->subject != NULL) query_put_text(&query, filter->subject);
     if (filter->side != NULL) query_put_text(&query, filter->side);
     if (filter->by_state) query_put_integer(&query, (int64_t)filter->state);
-    put_exchange_bounds(&query, filter);
+    for (int i = 0; i < filter->alternative_count; i++)
+        put_alternative(&query, &filter->alternative[i]);
     query_put_integer(&query, filter->limit + 1);
     const enum ischia_code code = show_rows(&query, listing, err);
     query_end(&query);
+    free(text);
     return code;
 }
 
@@ -287,6 +284,8 @@ enum ischia_code store_list(struct store *store, const struct store_filter *filt
     int64_t before = INT64_MAX;
     CHECK(filter->limit >= 1 && filter->limit <= STORE_LIST_LIMIT_MAX, err, ISCHIA_E_INPUT,
           "limit is %d; accepted 1 to %d", filter->limit, STORE_LIST_LIMIT_MAX);
+    CHECK(filter->alternative_count <= STORE_ALTERNATIVES_MAX, err, ISCHIA_E_INPUT,
+          "more than %d alternatives", STORE_ALTERNATIVES_MAX);
     CHECK(filter->cursor == NULL || read_cursor(filter->cursor, &before), err, ISCHIA_E_INPUT,
           "the cursor is not one that a listing returned");
     struct listing listing = {.filter = filter, .on_row = on_row, .context = context};

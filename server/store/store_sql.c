@@ -249,11 +249,18 @@ const struct sql_text sql_text[SQL_COUNT] = {
     [SQL_STUDY_WAITING] = {.sqlite = "SELECT count(*) FROM study_point WHERE state = 0"},
 };
 
-const struct sql_text sql_piece[SQL_PIECE_COUNT] = {
-    [SQL_PIECE_STATES] = {.sqlite = " AND (1 << a.state & ?) <> 0",
-                          .postgresql = " AND (1::bigint << a.state::int & ?) <> 0"},
-    [SQL_PIECE_CHANGED] = {.sqlite = "max(a.created_ms, a.started_ms, a.finished_ms)",
-                           .postgresql = "greatest(a.created_ms, a.started_ms, a.finished_ms)"},
+#define TIMES "(a.created_ms, a.started_ms, a.finished_ms)"
+
+const struct sql_text sql_alternative[STORE_ALTERNATIVE_KIND_COUNT] = {
+    [STORE_HAS_ID] = {.sqlite = "a.id = ?"},
+    [STORE_OF_PERSON] = {.sqlite =
+                             "a.seq IN (SELECT seq FROM assessment WHERE subject = ? UNION SELECT "
+                             "assessment FROM origin WHERE reference = ?)"},
+    [STORE_IN_STATES] = {.sqlite = "(1 << a.state & ?) <> 0",
+                         .postgresql = "(1::bigint << a.state::int & ?) <> 0"},
+    [STORE_ENDED] = {.sqlite = "a.finished_ms >= ? AND a.finished_ms < ?"},
+    [STORE_CHANGED] = {.sqlite = "max" TIMES " >= ? AND max" TIMES " < ?",
+                       .postgresql = "greatest" TIMES " >= ? AND greatest" TIMES " < ?"},
 };
 
 const char *sql_for(const struct engine *engine, const struct sql_text *text)

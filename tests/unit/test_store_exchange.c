@@ -152,14 +152,49 @@ static bool keep(void *context, const struct store_assessment *row)
     return true;
 }
 
-static int list(struct store *store, struct store_filter filter)
+/* How many rows fit: of each condition one alternative. */
+static int fitting(struct store *store, int count, const struct store_alternative *alternative)
 {
     struct ischia_error err = {0};
     struct listed listed = {.count = 0};
     char cursor[STORE_CURSOR_BYTES];
-    filter.limit = 8;
+    const struct store_filter filter = {
+        .alternative = alternative, .alternative_count = count, .limit = 8};
     OK(store_list(store, &filter, keep, &listed, cursor, &err));
     return listed.count;
+}
+
+static int fits(struct store *store, struct store_alternative only)
+{
+    return fitting(store, 1, &only);
+}
+
+/* Both: as conditions of their own, then as alternatives. */
+static void check_two(struct store *store, struct store_alternative a, struct store_alternative b,
+                      int both, int either)
+{
+    struct store_alternative two[] = {a, b};
+    two[1].condition = 1;
+    assert_int_equal(fitting(store, 2, two), both);
+    two[1].condition = 0;
+    assert_int_equal(fitting(store, 2, two), either);
+}
+
+static struct store_alternative person(const char *subject, const char *reference)
+{
+    return (struct store_alternative){
+        .kind = STORE_OF_PERSON, .subject = subject, .reference = reference};
+}
+
+static struct store_alternative in_states(unsigned states)
+{
+    return (struct store_alternative){.kind = STORE_IN_STATES, .states = states};
+}
+
+static struct store_alternative times(enum store_alternative_kind kind, int64_t from_ms,
+                                      int64_t before_ms)
+{
+    return (struct store_alternative){.kind = kind, .from_ms = from_ms, .before_ms = before_ms};
 }
 
 static void test_searching_by_person_state_and_time(void **state)
@@ -174,32 +209,52 @@ static void test_searching_by_person_state_and_time(void **state)
     clock_ms += HOUR_MS;
     solve_all(store);
     clock_ms += HOUR_MS;
-    (void)accept_of(store, 2, NULL);
-    assert_int_equal(list(store, (struct store_filter){.id = &one.id}), 1);
-    assert_int_equal(list(store, (struct store_filter){.id = &one.id, .person = {"P-018", NULL}}),
-                     0);
-    assert_int_equal(
-        list(store, (struct store_filter){.id = &one.id, .states = 1U << QUEUE_QUEUED}), 0);
-    assert_int_equal(list(store, (struct store_filter){.id = &one.id,
-                                                       .person = {"x", "Patient/1"},
-                                                       .finished_from_ms = begun_ms}),
-                     1);
-    assert_int_equal(list(store, (struct store_filter){.person = {"nobody", "Patient/1"}}), 1);
-    assert_int_equal(list(store, (struct store_filter){.person = {"P-017", "Patient/2"}}), 2);
-    assert_int_equal(list(store, (struct store_filter){.person = {"nobody", "Patient/2"}}), 0);
-    assert_int_equal(list(store, (struct store_filter){.states = 1U << QUEUE_SUCCEEDED}), 1);
-    assert_int_equal(list(store, (struct store_filter){.states = 3U << QUEUE_QUEUED}), 1);
-    assert_int_equal(list(store, (struct store_filter){.finished_from_ms = begun_ms + HOUR_MS}), 1);
-    assert_int_equal(list(store, (struct store_filter){.finished_from_ms = begun_ms + HOUR_MS + 1}),
-                     0);
+    const struct store_accepted two = accept_of(store, 2, NULL);
+    const struct store_alternative first = {.kind = STORE_HAS_ID, .id = one.id};
+    const struct store_alternative second = {.kind = STORE_HAS_ID, .id = two.id};
+    const unsigned queued = 1U << QUEUE_QUEUED, succeeded = 1U << QUEUE_SUCCEEDED;
+    assert_int_equal(fits(store, first), 1);
+    check_two(store, first, second, 0, 2);
+    check_two(store, first, person("P-018", "x"), 0, 1);
+    check_two(store, first, in_states(queued), 0, 2);
+    check_two(store, person("x", "Patient/1"), times(STORE_ENDED, begun_ms, 0), 1, 1);
+    assert_int_equal(fits(store, person("nobody", "Patient/1")), 1);
+    assert_int_equal(fits(store, person("P-017", "Patient/2")), 2);
+    assert_int_equal(fits(store, person("nobody", "Patient/2")), 0);
+    check_two(store, person("nobody", "Patient/2"), person("nobody", "Patient/1"), 0, 1);
+    assert_int_equal(fits(store, in_states(succeeded)), 1);
+    assert_int_equal(fits(store, in_states(3U << QUEUE_QUEUED)), 1);
+    check_two(store, in_states(succeeded), in_states(queued), 0, 2);
+    assert_int_equal(fits(store, times(STORE_ENDED, begun_ms + HOUR_MS, 0)), 1);
+    assert_int_equal(fits(store, times(STORE_ENDED, begun_ms + HOUR_MS + 1, 0)), 0);
     /* the second has not ended: no bound on its end fits it */
-    assert_int_equal(list(store, (struct store_filter){.finished_before_ms = INT64_MAX}), 1);
-    assert_int_equal(list(store, (struct store_filter){.finished_before_ms = 1}), 0);
-    assert_int_equal(
-        list(store, (struct store_filter){.changed_before_ms = begun_ms + 2 * HOUR_MS}), 1);
-    assert_int_equal(list(store, (struct store_filter){.changed_from_ms = begun_ms + 2 * HOUR_MS}),
-                     1);
-    assert_int_equal(list(store, (struct store_filter){.changed_from_ms = 1}), 2);
+    assert_int_equal(fits(store, times(STORE_ENDED, 0, INT64_MAX)), 1);
+    assert_int_equal(fits(store, times(STORE_ENDED, 0, 1)), 0);
+    assert_int_equal(fits(store, times(STORE_CHANGED, 0, begun_ms + 2 * HOUR_MS)), 1);
+    assert_int_equal(fits(store, times(STORE_CHANGED, begun_ms + 2 * HOUR_MS, 0)), 1);
+    assert_int_equal(fits(store, times(STORE_CHANGED, 1, 0)), 2);
+    check_two(store, times(STORE_CHANGED, 1, 2), times(STORE_ENDED, 1, 0), 0, 1);
+}
+
+static void test_a_search_may_have_so_many_values(void **state)
+{
+    struct room *room = *state;
+    struct store_alternative many[STORE_ALTERNATIVES_MAX + 1];
+    struct ischia_error err = {0};
+    struct listed listed = {.count = 0};
+    char cursor[STORE_CURSOR_BYTES];
+    (void)accept_of(room->store, 1, "Patient/1");
+    for (int i = 0; i <= STORE_ALTERNATIVES_MAX; i++) {
+        many[i] = i % 2 == 0 ? person("P-018", "Patient/2") : times(STORE_CHANGED, 1, 2);
+        many[i].condition = i / 4;
+    }
+    many[STORE_ALTERNATIVES_MAX - 1] = person("P-018", "Patient/1");
+    assert_int_equal(fitting(room->store, STORE_ALTERNATIVES_MAX, many), 0);
+    for (int i = 0; i < STORE_ALTERNATIVES_MAX; i++) many[i].condition = 0;
+    assert_int_equal(fitting(room->store, STORE_ALTERNATIVES_MAX, many), 1);
+    const struct store_filter filter = {
+        .alternative = many, .alternative_count = STORE_ALTERNATIVES_MAX + 1, .limit = 8};
+    assert_int_equal(store_list(room->store, &filter, keep, &listed, cursor, &err), ISCHIA_E_INPUT);
 }
 
 int main(void)
@@ -209,6 +264,7 @@ int main(void)
         STORE_TEST(test_retries_wait_and_end),
         STORE_TEST(test_erasing_takes_everything_along),
         STORE_TEST(test_searching_by_person_state_and_time),
+        STORE_TEST(test_a_search_may_have_so_many_values),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
