@@ -229,8 +229,8 @@ static enum ischia_code read_rows(struct cohort *k, struct doc_faults *faults,
         const enum ischia_code code = csv_read(&k->reader, &k->row, &end, &why);
         if (code == ISCHIA_OK && end) return ISCHIA_OK;
         if (k->study->what.count == k->points_max) {
-            doc_faults_add(faults, "", "out_of_range", "there are more than %zu rows",
-                           k->points_max);
+            doc_faults_say(faults, "", "out_of_range", WORD_DAEMON_REFUSAL_STUDY_ROWS,
+                           WORDS(word_count("max", (long long)k->points_max)));
             return ISCHIA_OK;
         }
         if (code == ISCHIA_OK)

@@ -67,10 +67,7 @@ static void answer(struct call *call, struct http_response *ret, answerer *give)
     struct ischia_error err;
     const struct http_request *http = call->request;
     if (call->service->estimator == NULL) {
-        reply_refusal_english(
-            http, ret, PROBLEM_NOT_FOUND,
-            "No trained emulator is in use here (option emulator), so there are no "
-            "estimates; an assessment is always solved.");
+        reply_refusal(http, ret, PROBLEM_NOT_FOUND, WORD_DAEMON_REFUSAL_NO_EMULATOR, NULL);
         return;
     }
     doc_faults_init(&faults);
@@ -130,6 +127,18 @@ static bool read_query(const struct call *call, struct sweep *ret)
     return true;
 }
 
+static void refuse_query(const struct call *call, struct http_response *ret)
+{
+    char known[64];
+    size_t used = 0;
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
+        used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i == 0 ? "" : ", ",
+                                 ischia_params[i].key);
+    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_WHAT_IF,
+                  WORDS(word_text("known", known), word_count("min", POINTS_MIN),
+                        word_count("max", POINTS_MAX)));
+}
+
 /* Over the training box, and no further than where the case would not be valid any more. */
 static void bound_sweep(const struct predictor *p, const struct ischia_case *c, struct sweep *sweep)
 {
@@ -169,9 +178,7 @@ static void send_sweep(struct call *call, const struct ischia_case *c, struct ht
     struct sweep sweep;
     struct json_out out;
     if (!read_query(call, &sweep)) {
-        reply_refusal_english(call->request, ret, PROBLEM_BAD_REQUEST,
-                              "parameter is one of R1, R2, eM, eF, muM, muF, F, and points a "
-                              "whole number from 2 to 201");
+        refuse_query(call, ret);
         return;
     }
     bound_sweep(p, c, &sweep);

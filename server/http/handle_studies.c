@@ -82,25 +82,30 @@ static bool is_csv(const struct call *call)
     return type != NULL && query_media_type_is(type, "text/csv");
 }
 
+/* A text of the query; false: ret is the refusal. */
+static bool find_text(struct call *call, const char *key, char *value, size_t size,
+                      struct http_response *ret)
+{
+    if (query_find(call->request->query, key, value, size) != QUERY_BAD) return true;
+    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_QUERY_TEXT,
+                  WORDS(word_text("key", key)));
+    return false;
+}
+
 /* What a CSV file has no place for. A design says it itself. */
 static bool read_query(struct call *call, struct cohort_query *q, struct http_response *ret)
 {
-    const char *query = call->request->query;
-    const enum query_answer name = query_find(query, "name", q->name, sizeof q->name);
-    const enum query_answer model = query_find(query, "model", q->model, sizeof q->model);
-    const enum query_answer resolution =
-        query_find(query, "resolution", q->resolution, sizeof q->resolution);
-    const char *wrong = NULL;
-    if (!is_csv(call) &&
-        (name != QUERY_ABSENT || model != QUERY_ABSENT || resolution != QUERY_ABSENT))
-        wrong = "name, model and resolution in the address are for a cohort as text/csv; a design "
-                "has them in itself.";
-    else if (name == QUERY_BAD || (name == QUERY_FOUND && !text_is_pseudonym(q->name)))
-        wrong = "name is 1 to 64 letters, digits, dots, hyphens and underscores.";
-    else if (model == QUERY_BAD || resolution == QUERY_BAD)
-        wrong = "model or resolution is given twice, too long or malformed.";
-    if (wrong != NULL) reply_refusal_english(call->request, ret, PROBLEM_BAD_REQUEST, "%s", wrong);
-    return wrong == NULL;
+    const bool good = find_text(call, "name", q->name, sizeof q->name, ret) &&
+                      find_text(call, "model", q->model, sizeof q->model, ret) &&
+                      find_text(call, "resolution", q->resolution, sizeof q->resolution, ret);
+    if (!good) return false;
+    const bool given = q->name[0] != '\0' || q->model[0] != '\0' || q->resolution[0] != '\0';
+    const bool misplaced = given && !is_csv(call);
+    if (!misplaced && (q->name[0] == '\0' || text_is_pseudonym(q->name))) return true;
+    reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST,
+                  misplaced ? WORD_DAEMON_REFUSAL_STUDY_QUERY : WORD_DAEMON_REFUSAL_STUDY_NAME,
+                  NULL);
+    return false;
 }
 
 static const char *or_null(const char *text) { return text[0] == '\0' ? NULL : text; }
@@ -144,17 +149,15 @@ static bool is_accepted(struct call *call, const struct store_study_accepted *ac
                         struct http_response *ret)
 {
     if (accepted->acceptance == STORE_KEY_CONFLICT) {
-        reply_refusal_english(call->request, ret, PROBLEM_IDEMPOTENCY,
-                              "This Idempotency-Key came with another body before; use a new one.");
+        reply_refusal(call->request, ret, PROBLEM_IDEMPOTENCY, WORD_DAEMON_REFUSAL_KEY_CONFLICT,
+                      NULL);
         return false;
     }
     if (accepted->acceptance != STORE_FULL) return true;
     http_header_static(ret, "Retry-After", "300");
-    reply_refusal_english(
-        call->request, ret, PROBLEM_QUEUE_FULL,
-        "%lld points of studies are waiting, and with this study there would be more "
-        "than %d, which is the limit; nothing was stored.",
-        (long long)accepted->waiting, call->service->config.study_limit);
+    reply_refusal(call->request, ret, PROBLEM_QUEUE_FULL, WORD_DAEMON_REFUSAL_STUDY_FULL,
+                  WORDS(word_count("n", accepted->waiting),
+                        word_count("max", call->service->config.study_limit)));
     return false;
 }
 
@@ -225,8 +228,8 @@ static bool read_page_query(struct call *call, long long *ret_limit, long long *
                       (l == QUERY_ABSENT || query_whole_number(limit, 1, MOST, ret_limit)) &&
                       (c == QUERY_ABSENT || query_whole_number(cursor, 1, INT64_MAX, ret_cursor));
     if (!good)
-        reply_refusal_english(call->request, ret, PROBLEM_BAD_REQUEST,
-                              "limit is 1 to %d, cursor what an earlier page returned.", (int)MOST);
+        reply_refusal(call->request, ret, PROBLEM_BAD_REQUEST, WORD_DAEMON_REFUSAL_STUDY_LIST,
+                      WORDS(word_count("max", MOST)));
     return good;
 }
 
@@ -292,7 +295,7 @@ void handle_study_cancel(struct call *call, struct http_response *ret)
     else if (answer == STORE_NOT_FOUND)
         reply_no_study(call, ret);
     else if (answer == STORE_CONFLICT)
-        reply_refusal_english(call->request, ret, PROBLEM_CONFLICT, "This study has ended.");
+        reply_refusal(call->request, ret, PROBLEM_CONFLICT, WORD_DAEMON_REFUSAL_STUDY_ENDED, NULL);
     else
         send_study(call, 200, ret); /* cancelling twice is no fault */
 }
@@ -306,8 +309,8 @@ void handle_study_erase(struct call *call, struct http_response *ret)
     else if (answer == STORE_NOT_FOUND)
         reply_no_study(call, ret);
     else if (answer == STORE_CONFLICT)
-        reply_refusal_english(call->request, ret, PROBLEM_CONFLICT,
-                              "Points of this study are being solved; cancel it first.");
+        reply_refusal(call->request, ret, PROBLEM_CONFLICT, WORD_DAEMON_REFUSAL_STUDY_RUNNING,
+                      NULL);
     else
         ret->status = 204;
 }

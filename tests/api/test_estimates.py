@@ -173,6 +173,10 @@ class WhatIf(unittest.TestCase):
         for query in ('?parameter=skin', '?parameter=', '?points=1', '?points=202', '?points=x'):
             answer = self.service.ask('POST', '/v1/estimates/what-if' + query, INSIDE)
             self.assertEqual(answer.status, 400, query)
+        german = self.service.ask('POST', '/v1/estimates/what-if?points=x', INSIDE,
+                                  {'Accept-Language': 'de'}).json()
+        self.assertEqual(german['detail'], 'parameter ist eines von R1, R2, eM, eF, muM, muF, F, und '
+                                           'points eine ganze Zahl von 2 bis 201.')
 
 
 class Installing(unittest.TestCase):

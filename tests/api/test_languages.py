@@ -8,7 +8,7 @@ import re
 import unittest
 import urllib.parse
 
-from service import HERE, SIDE, Service, direct_only, side
+from service import HERE, SIDE, Service, direct_only, eventually, side
 
 ABSENT = '/v1/assessments/01a201a9-49a6-75d9-8b79-1f36e7bd6914'
 FORM = {'Content-Type': 'application/x-www-form-urlencoded', 'Accept': 'text/html'}
@@ -25,7 +25,7 @@ WORDS = {tag: words(tag) for tag in ('en', 'fr', 'de')}
 class Languages(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.service = Service()
+        cls.service = Service('--emulator', 'none', '--study-limit', '100')
         cls.service.until_ready()
         answer = cls.service.ask('POST', '/v1/assessments', side(subject='P-1', side='left', R2=80),
                                  {'Prefer': 'wait=60'})
@@ -120,6 +120,39 @@ class Languages(unittest.TestCase):
             ('GET', self.path + '/report?wait=x', None, {}, None),
             ('POST', '/v1/assessments', SIDE, {'Origin': 'http://elsewhere'},
              'daemon.refusal.origin'))
+
+    def test_refusals_of_studies_and_estimates(self):
+        kind = {'Content-Type': 'text/csv'}
+        key = {**kind, 'Idempotency-Key': 'study'}
+
+        def rows(force, count=1):
+            row = ','.join(map(str, {**SIDE, 'F': force}.values()))
+            return '\n'.join([','.join(SIDE)] + [row] * count).encode()
+
+        def begun(body, status):
+            where = self.service.ask('POST', '/v1/studies', body, key).headers['Location']
+            eventually(lambda: self.service.get(where).json()['status'] == status, where)
+            key['Idempotency-Key'] += 'x'
+            return where
+
+        ended, running = begun(rows(301), 'finished'), begun(rows(599, 60), 'running')
+        self.check_refusals(
+            ('POST', '/v1/studies?name=Jane%20Doe', rows(302), kind, 'daemon.refusal.study_name'),
+            ('POST', '/v1/studies?name=x', {'name': 'x'}, {}, 'daemon.refusal.study_query'),
+            ('POST', '/v1/studies?model=x&model=y', rows(302), kind, None),
+            ('POST', '/v1/studies', rows(302), {**kind, 'Idempotency-Key': 'study'},
+             'daemon.refusal.key_conflict'),
+            ('POST', '/v1/studies', rows(303, 60), kind, None),  # full
+            ('GET', '/v1/studies?limit=0', None, {}, None),
+            ('POST', ended + '/cancel', None, {}, 'daemon.refusal.study_ended'),
+            ('DELETE', running, None, {}, 'daemon.refusal.study_running'),
+            ('GET', ended[:-1] + ('1' if ended[-1] == '0' else '0'), None, {},
+             'daemon.refusal.no_study'),
+            ('POST', '/v1/estimates', SIDE, {}, 'daemon.refusal.no_emulator'))
+        answer = self.service.ask('POST', '/v1/studies', rows(303, 101),
+                                  {**kind, 'Accept-Language': 'de'})
+        self.assertEqual(answer.json()['errors'][0]['detail'], 'es sind mehr als 100 Zeilen')
+        self.service.ask('POST', running + '/cancel')
 
     @direct_only('nginx says which host was asked')
     def test_a_strange_host(self):

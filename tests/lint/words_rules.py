@@ -13,8 +13,9 @@ PLACEHOLDER = re.compile(r"\{(\w+)\}")
 FOR_PEOPLE = (
     "api/case_doc.c", "api/case_fields.c", "api/case_words.c", "api/parameters_doc.c",
     "api/risk.c", "server/cli/section_words.c", "server/http/guard.c",
-    "server/http/handle_assessments.c", "server/http/handle_field.c", "server/http/handle_list.c",
-    "server/http/handle_report.c", "server/http/handle_system.c", "server/http/page.c",
+    "server/http/handle_assessments.c", "server/http/handle_estimates.c",
+    "server/http/handle_field.c", "server/http/handle_list.c", "server/http/handle_report.c",
+    "server/http/handle_studies.c", "server/http/handle_system.c", "server/http/page.c",
     "server/http/reply.c", "server/http/routes.c", "server/http/submit.c", "solver/case.c",
     "solver/section_svg.c",
 )
