@@ -80,7 +80,6 @@ static bool is_ours(const struct json *observation)
 static void read_prefetch(struct cds_request *ret, const struct json *bundle)
 {
     const char *type = bundle == NULL ? NULL : text_of(bundle, "resourceType");
-    int64_t newest = INT64_MIN, from, until;
     if (type == NULL || strcmp(type, "Bundle") != 0) return;
     ret->has_observations = true;
     const struct json *entries = json_member(bundle, "entry");
@@ -88,9 +87,8 @@ static void read_prefetch(struct cds_request *ret, const struct json *bundle)
         const struct json *observation = json_member(e, "resource");
         const char *time = text_of(observation, "effectiveDateTime");
         if (!is_ours(observation) || time == NULL || strlen(time) >= sizeof ret->measured_at ||
-            !fhir_date_span(time, &from, &until) || from <= newest)
+            !fhir_date_is_after(time, ret->measured_at))
             continue;
-        newest = from;
         (void)snprintf(ret->measured_at, sizeof ret->measured_at, "%s", time);
     }
 }
@@ -143,16 +141,19 @@ __attribute__((format(printf, 3, 4))) static void add(char *text, size_t size, c
     va_end(arguments);
 }
 
-static const char *side_words(const struct record *record)
+static const char *site_words(const struct record *record)
 {
-    static const char *const words[ISCHIA_SIDE_COUNT] = {"Side not given", "Left", "Right"};
+    static const char *const words[ISCHIA_SIDE_COUNT] = {
+        [ISCHIA_SIDE_NONE] = "Ischium, side not given",
+        [ISCHIA_SIDE_LEFT] = "Left ischium",
+        [ISCHIA_SIDE_RIGHT] = "Right ischium",
+    };
     return words[record->request.side];
 }
 
 static void write_detail(char *text, size_t size, const struct record *last,
                          const struct record *other, const char *measured_at)
 {
-    int64_t measured = 0, made = 0, until;
     char digits[2][TEXT_NUMBER_BYTES];
     text[0] = '\0';
     for (int i = 0; i < last->risk.reason_count; i++)
@@ -161,10 +162,9 @@ static void write_detail(char *text, size_t size, const struct record *last,
         record_digits(last, measure_find("eps_max"), digits[0]),
         record_digits(last, measure_find("eps_max_error"), digits[1]));
     if (other != NULL)
-        add(text, size, "- %s side, last assessed %.10s: %s\n", side_words(other),
-            other->finished_at, risk_headline(other->risk.band));
-    if (measured_at[0] != '\0' && fhir_date_span(measured_at, &measured, &until) &&
-        fhir_date_span(last->created_at, &made, &until) && measured > made)
+        add(text, size, "- %s, last assessed %.10s: %s\n", site_words(other), other->finished_at,
+            risk_headline(other->risk.band));
+    if (fhir_date_is_after(measured_at, last->created_at))
         add(text, size, "\n**The record has measurements of %.10s, newer than this assessment.**\n",
             measured_at);
     for (size_t i = 0; i < RISK_CAVEAT_COUNT; i++) add(text, size, "\n*%s*", risk_caveat(i));
@@ -187,8 +187,8 @@ void cds_put_card(struct json_out *out, const struct record *last, const struct 
     char summary[SUMMARY_CHARACTERS_MAX + 1], detail[DETAIL_BYTES];
     const bool worst_below =
         last->risk.band == RISK_BELOW && (other == NULL || other->risk.band == RISK_BELOW);
-    (void)snprintf(summary, sizeof summary, "%s ischium, %.10s: %s", side_words(last),
-                   last->finished_at, risk_headline(last->risk.band));
+    (void)snprintf(summary, sizeof summary, "%s, %.10s: %s", site_words(last), last->finished_at,
+                   risk_headline(last->risk.band));
     write_detail(detail, sizeof detail, last, other, measured_at);
     json_open_object(out, NULL);
     json_put_string(out, "uuid", last->id);

@@ -106,6 +106,12 @@ bool fhir_date_span(const char *text, int64_t *ret_lo, int64_t *ret_hi)
     return true;
 }
 
+bool fhir_date_is_after(const char *a, const char *b)
+{
+    int64_t begins, other, end;
+    return fhir_date_span(a, &begins, &end) && (!fhir_date_span(b, &other, &end) || begins > other);
+}
+
 /* 0 says that there is no bound; nothing that is looked for is older than 1970. */
 static int64_t bound(int64_t ms) { return ms < 1 ? 1 : ms; }
 

@@ -9,6 +9,7 @@
 
 #include "api/case_places.h"
 #include "api/fhir.h"
+#include "api/fhir_date.h"
 #include "api/measure.h"
 #include "api/ucum.h"
 
@@ -229,7 +230,8 @@ static void take_time(struct reader *r, const struct json *observation)
     char *known = r->input->request.measured_at;
     if (time == NULL || strlen(time) >= ISCHIA_MEASURED_AT_BYTES || !text_is_date_or_time(time))
         return;
-    if (strcmp(time, known) > 0) (void)snprintf(known, ISCHIA_MEASURED_AT_BYTES, "%s", time);
+    if (fhir_date_is_after(time, known))
+        (void)snprintf(known, ISCHIA_MEASURED_AT_BYTES, "%s", time);
 }
 
 static bool has_a_value(struct reader *r, const struct json *observation, const char *where)

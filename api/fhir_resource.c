@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The resources of one assessment. */
-#include <assert.h>
+#include <ctype.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -109,6 +109,16 @@ static void put_subject(struct json_out *out, const struct record *record)
     json_close_object(out);
 }
 
+/* When it was measured, else when it was sent. RFC 3339 allows "t" and "z", FHIR does not. */
+static void put_effective(struct json_out *out, const struct record *record)
+{
+    const char *measured = record->request.measured_at;
+    char time[ISCHIA_MEASURED_AT_BYTES];
+    (void)snprintf(time, sizeof time, "%s", measured[0] != '\0' ? measured : record->created_at);
+    for (char *c = time; *c != '\0'; c++) *c = (char)toupper((unsigned char)*c);
+    json_put_string(out, "effectiveDateTime", time);
+}
+
 static void put_site(struct json_out *out, const struct record *record)
 {
     /* SNOMED CT expressions: the structure, refined by its laterality. */
@@ -206,7 +216,6 @@ static void put_observation(struct json_out *out, const char *key, const struct 
 {
     char id[FHIR_ID_BYTES];
     const bool input = measure_is_input(measure);
-    const char *measured = record->request.measured_at;
     if (contained)
         measure_id(measure, id);
     else
@@ -216,7 +225,7 @@ static void put_observation(struct json_out *out, const char *key, const struct 
     json_put_string(out, "status", "final");
     fhir_put_measure_code(out, "code", measure);
     put_subject(out, record);
-    json_put_string(out, "effectiveDateTime", measured[0] != '\0' ? measured : record->created_at);
+    put_effective(out, record);
     put_quantity(out, record, measure);
     put_site(out, record);
     if (!input) {
@@ -356,7 +365,6 @@ static void put_contained(struct json_out *out, const struct record *record)
 void fhir_put_diagnostic_report(struct json_out *out, const char *key, const struct record *record,
                                 const char *html, bool contained)
 {
-    const char *measured = record->request.measured_at;
     const bool done = record->status == ASSESSMENT_SUCCEEDED;
     fhir_open(out, key, "DiagnosticReport", record->id);
     if (!contained) put_meta(out, record);
@@ -365,7 +373,7 @@ void fhir_put_diagnostic_report(struct json_out *out, const char *key, const str
     json_put_string(out, "status", status_words[record->status]);
     put_code(out, record);
     put_subject(out, record);
-    json_put_string(out, "effectiveDateTime", measured[0] != '\0' ? measured : record->created_at);
+    put_effective(out, record);
     if (record->finished_at[0] != '\0') json_put_string(out, "issued", record->finished_at);
     put_observation_references(out, "result", record, MEASURE_COUNT, contained);
     if (done)

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "api/case_places.h"
+#include "api/fhir_date.h"
 #include "api/hl7.h"
 #include "api/measure.h"
 #include "api/ucum.h"
@@ -201,7 +202,8 @@ static void take_time(struct reader *r, int segment)
     char *known = r->input->request.measured_at;
     if (!hl7_get(r->m, segment, 14, 1, ts, sizeof ts)) return;
     hl7_time_read(ts, time);
-    if (strcmp(time, known) > 0) (void)snprintf(known, ISCHIA_MEASURED_AT_BYTES, "%s", time);
+    if (fhir_date_is_after(time, known))
+        (void)snprintf(known, ISCHIA_MEASURED_AT_BYTES, "%s", time);
 }
 
 static void read_text(struct reader *r, int segment, const char *key)

@@ -12,11 +12,15 @@
 
 void hl7_time(const char *rfc3339, char ret[HL7_TIME_BYTES])
 {
+    enum { FRACTION_DIGITS_MAX = 4 };
     size_t used = 0;
     const char *offset = strpbrk(rfc3339, "Zz+");
     if (offset == NULL && strlen(rfc3339) > 10) offset = strrchr(rfc3339, '-');
+    const char *point = strchr(rfc3339, '.');
     for (const char *c = rfc3339; *c != '\0' && used + 6 < HL7_TIME_BYTES; c++) {
         if (c == offset && toupper((unsigned char)*c) == 'Z') break;
+        if (point != NULL && offset != NULL && c > point + FRACTION_DIGITS_MAX && c < offset)
+            continue;
         if (isdigit((unsigned char)*c) || *c == '.' || c == offset) ret[used++] = *c;
     }
     ret[used] = '\0';

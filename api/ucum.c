@@ -18,6 +18,7 @@ static const struct ucum_unit units[] = {
     {"gf", "N", 0, 0.00980665}, {"kgf", "N", 0, 9.80665},  {"[lbf_av]", "N", 0, 4.4482216152605},
 };
 enum { UNIT_COUNT = sizeof units / sizeof units[0] };
+enum { FAR = 9999 }; /* beyond any double, whichever way, behind the digits that JSON may have */
 
 const struct ucum_unit *ucum_unit_at(size_t index)
 {
@@ -35,7 +36,8 @@ static const struct ucum_unit *find(const char *code)
 static void shift(const char *digits, int power, char ret[UCUM_DIGITS_BYTES])
 {
     const size_t mantissa = strcspn(digits, "eE");
-    const long exponent = digits[mantissa] == '\0' ? 0 : strtol(digits + mantissa + 1, NULL, 10);
+    const long given = digits[mantissa] == '\0' ? 0 : strtol(digits + mantissa + 1, NULL, 10);
+    const long exponent = given < -FAR ? -FAR : given > FAR ? FAR : given;
     (void)snprintf(ret, UCUM_DIGITS_BYTES, "%.*se%ld", (int)mantissa, digits, exponent + power);
 }
 

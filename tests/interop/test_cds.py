@@ -64,13 +64,18 @@ class Cds(unittest.TestCase):
             self.assertLess(len(card['summary']), 140)
             self.assertIn('Left ischium', card['summary'])
             self.assertEqual(card['indicator'], 'warning')
-            self.assertIn('Right side, last assessed', card['detail'])
+            self.assertIn('Right ischium, last assessed', card['detail'])
             self.assertIn('not a medical device', card['detail'])
             self.assertEqual(
                 card['links'][0],
                 {'label': 'Report', 'type': 'absolute',
                  'url': f'{PUBLIC}/v1/assessments/{self.last}/report'})
             self.assertTrue(card['source']['label'].startswith('Ischia'))
+
+    def test_a_side_that_was_not_given(self):
+        post(self.service, parameters(F=305, subject='Patient/sideless', side=None))
+        (card,) = self.ask('ischia-patient-view', hook(patient='sideless')).json()['cards']
+        self.assertRegex(card['summary'], r'^Ischium, side not given, \d{4}-\d\d-\d\d: Muscle')
 
     def test_no_hook_starts_a_solve(self):
         before = self.service.get('/v1/changes').json()['newest_seq']

@@ -9,7 +9,7 @@ import unittest
 
 import interop
 from interop import FHIR, MEASURE, bundle, observation, parameters, post, resources
-from service import PROXY, SIDE, Service, admin, direct_only
+from service import PROXY, SIDE, Service, admin, direct_only, side
 
 READ = ('RiskAssessment', 'DiagnosticReport', 'Provenance')
 
@@ -205,6 +205,11 @@ class Fhir(unittest.TestCase):
         v1 = self.service.get('/v1/assessments/' + identity).json()
         self.assertEqual((v1['side'], v1['measured_at']), ('right', '2026-03-01T09:30:00Z'))
         self.assertEqual(v1['parameters'], {**SIDE, 'F': 350})
+        later = bundle(F=353)  # the latest by the clock
+        later['entry'][0]['resource']['effectiveDateTime'] = '2026-03-01T11:00:00+02:00'
+        identity = resources(post(self.service, later).json(), 'RiskAssessment')[0]['id']
+        measured = self.service.get('/v1/assessments/' + identity).json()['measured_at']
+        self.assertEqual(measured, '2026-03-01T09:30:00Z')
         wrapped = parameters(F=None, side='left')
         wrapped['parameter'] = wrapped['parameter'][7 - 1:] + [
             {'name': 'observations', 'resource': bundle(F=351)}]
@@ -323,6 +328,13 @@ class Fhir(unittest.TestCase):
         self.assertEqual(self.service.ask('DELETE', where).status, 202)
         self.assertEqual(self.service.get(where).status, 409)
         self.assertEqual(self.emit(self.get('RiskAssessment/' + identity))['status'], 'cancelled')
+
+    def test_times_have_capital_letters(self):
+        sent = side(F=360, measured_at='2026-03-01t09:30:00.5z')
+        identity = self.service.ask('POST', '/v1/assessments', sent, {'Prefer': 'wait=60'}).json()['id']
+        for path in (f'Observation/{identity}-R1', f'DiagnosticReport/{identity}'):
+            answer = self.emit(self.get(path))
+            self.assertEqual(answer['effectiveDateTime'], '2026-03-01T09:30:00.5Z')
 
     def test_a_solve_that_fails_says_so(self):
         answer = post(self.service, parameters(F=598))

@@ -143,6 +143,19 @@ static void test_a_bound_before_1970_is_one(void **state)
     }
 }
 
+static void test_which_is_later(void **state)
+{
+    (void)state;
+    assert_true(fhir_date_is_after("2026-03-01T08:30:00Z", "2026-03-01T09:00:00+02:00"));
+    assert_false(fhir_date_is_after("2026-03-01T09:00:00+02:00", "2026-03-01T08:30:00Z"));
+    assert_false(fhir_date_is_after("2026-03-01T09:00:00+01:00", "2026-03-01T08:00:00Z"));
+    assert_true(fhir_date_is_after("2026-03-01T00:01:00Z", "2026-03-01"));
+    assert_true(fhir_date_is_after("2026", ""));
+    assert_true(fhir_date_is_after("0001", ""));
+    assert_false(fhir_date_is_after("", "2026"));
+    assert_false(fhir_date_is_after("", ""));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -151,6 +164,7 @@ int main(void)
         cmocka_unit_test(test_what_is_no_date),
         cmocka_unit_test(test_prefixes_bound_a_range),
         cmocka_unit_test(test_a_bound_before_1970_is_one),
+        cmocka_unit_test(test_which_is_later),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -94,6 +94,10 @@ static void test_times(void **state)
         if (z == NULL) assert_string_equal(back, both[i].rfc3339);
         if (z != NULL) assert_non_null(strstr(back, "+00:00"));
     }
+    hl7_time("2026-03-01T09:30:00.1234567+01:00", ts); /* HL7 has four digits behind the point */
+    assert_string_equal(ts, "20260301093000.1234+0100");
+    hl7_time("2026-03-01t09:30:00.12345678901234567z", ts);
+    assert_string_equal(ts, "20260301093000.1234+0000");
     hl7_time_read("20260301093000", back); /* no offset: whose clock is not said */
     assert_string_equal(back, "2026-03-01");
     hl7_time_read("202603", back);
@@ -151,6 +155,27 @@ static void test_single_options_have_no_place(void **state)
     assert_false(hl7_carries(&request));
 }
 
+/* The latest by the clock, not by its digits. */
+static void test_the_latest_observation_says_when(void **state)
+{
+    static const char *const times[] = {"20260301090000+0200", "20260301083000+0000", "20260301"};
+    static struct hl7_input input;
+    const double values[] = {7.1, 22.8, 31, 10, 8, 5, 258};
+    struct doc_faults faults;
+    char text[1024];
+    size_t used = (size_t)snprintf(text, sizeof text,
+                                   "MSH|^~\\&|EHR|||||"
+                                   "|ORU^R01|1|P|2.5.1\rOBR|1\r");
+    (void)state;
+    doc_faults_init(&faults);
+    for (int i = 0; i < ISCHIA_PARAM_COUNT; i++)
+        used += (size_t)snprintf(
+            text + used, sizeof text - used, "OBX|%d|NM|%s^^99ISCHIA||%g|%s^^UCUM|||||F|||%s\r",
+            i + 1, ischia_params[i].key, values[i], ischia_params[i].unit, times[i % 3]);
+    assert_int_equal(hl7_read(&input, text, used, "ISCHIA", &faults), HL7_ACCEPTED);
+    assert_string_equal(input.request.measured_at, "2026-03-01T08:30:00+00:00");
+}
+
 /* ids of Observations are made of codes and read back; no two codes give the same. */
 static void test_measures(void **state)
 {
@@ -180,6 +205,7 @@ int main(void)
         cmocka_unit_test(test_times),
         cmocka_unit_test(test_a_request_is_read_back),
         cmocka_unit_test(test_single_options_have_no_place),
+        cmocka_unit_test(test_the_latest_observation_says_when),
         cmocka_unit_test(test_measures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

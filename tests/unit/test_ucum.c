@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -28,6 +29,29 @@ static void test_powers_of_ten_are_exact(void **state)
         const double got = strtod(converted, NULL), wanted = strtod(rows[i].same, NULL);
         assert_memory_equal(&got, &wanted, sizeof got);
     }
+}
+
+static void test_exponents_beyond_any_number(void **state)
+{
+    static const struct {
+        const char *digits;
+        double value;
+    } rows[] = {
+        {"1e-9223372036854775808", 0},
+        {"1e-99999999999999999999999", 0},
+        {"0e9223372036854775807", 0},
+        {"1e9223372036854775807", HUGE_VAL},
+    };
+    static const char *const units[] = {"um", "m"};
+    char converted[UCUM_DIGITS_BYTES];
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        for (size_t u = 0; u < 2; u++) {
+            assert_int_equal(ucum_convert(rows[i].digits, units[u], "mm", converted),
+                             UCUM_CONVERTED);
+            const double got = strtod(converted, NULL);
+            assert_memory_equal(&got, &rows[i].value, sizeof got);
+        }
 }
 
 static void test_the_same_unit_keeps_the_digits(void **state)
@@ -79,6 +103,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_powers_of_ten_are_exact),
+        cmocka_unit_test(test_exponents_beyond_any_number),
         cmocka_unit_test(test_the_same_unit_keeps_the_digits),
         cmocka_unit_test(test_other_factors),
         cmocka_unit_test(test_what_is_refused_leaves_the_output),
