@@ -70,26 +70,27 @@ struct token_wish {
     const char *name;
 };
 
+/* Behind "NAME="; NULL: the word is another. */
+static const char *value_of(const char *word, const char *name)
+{
+    const size_t length = strlen(name);
+    return strncmp(word, name, length) == 0 && word[length] == '=' ? word + length + 1 : NULL;
+}
+
 static enum ischia_code parse_wish(struct token_wish *wish, const char *word,
                                    struct ischia_error *err)
 {
-    const char *equals = strchr(word, '=');
-    CHECK(equals != NULL, err, ISCHIA_E_INPUT, "token create: '%.40s' is not NAME=VALUE", word);
-    const size_t length = (size_t)(equals - word);
-    if (strncmp(word, "scope", length) == 0) {
-        wish->scopes = auth_parse_scopes(equals + 1);
-        CHECK(wish->scopes != 0, err, ISCHIA_E_INPUT,
-              "token create: scope is '%.40s'; accepted read, assess, admin, with commas between",
-              equals + 1);
-    } else if (strncmp(word, "expires", length) == 0) {
-        CHECK(parse_expiry(equals + 1, &wish->expires_ms), err, ISCHIA_E_INPUT,
-              "token create: expires is '%.40s'; write 30d, 12h or 45m", equals + 1);
-    } else if (strncmp(word, "name", length) == 0) {
-        wish->name = equals + 1;
-    } else {
-        return FAIL(err, ISCHIA_E_INPUT, "token create takes scope, expires and name, not '%.40s'",
-                    word);
-    }
+    const char *scope = value_of(word, "scope"), *expires = value_of(word, "expires");
+    const char *name = value_of(word, "name");
+    if (scope != NULL) wish->scopes = auth_parse_scopes(scope);
+    if (name != NULL) wish->name = name;
+    CHECK(scope != NULL || expires != NULL || name != NULL, err, ISCHIA_E_INPUT,
+          "token create takes scope=, expires= and name=, not '%.40s'", word);
+    CHECK(wish->scopes != 0, err, ISCHIA_E_INPUT,
+          "token create: scope is '%.40s'; accepted read, assess, admin, with commas between",
+          scope);
+    CHECK(expires == NULL || parse_expiry(expires, &wish->expires_ms), err, ISCHIA_E_INPUT,
+          "token create: expires is '%.40s'; write 30d, 12h or 45m", expires);
     return ISCHIA_OK;
 }
 

@@ -526,6 +526,12 @@ class Copies(unittest.TestCase):
             done = admin(state, 'token', 'crate', check=False)
             self.assertEqual(done.returncode, 2)
             self.assertIn('token create', done.stderr)
+            for word in ('=admin', 's=admin', 'scop=read', 'scopes=read', 'read', '', 'scope=',
+                         'scope=all', 'expires=soon', 'expires=30d2'):
+                done = admin(state, 'token', 'create', word, check=False)
+                self.assertEqual((done.returncode, done.stdout), (2, ''), word)
+                self.assertIn('token create', done.stderr)
+            self.assertEqual(admin(state, 'token', 'list').count('\n'), 1)
 
 
 if __name__ == '__main__':
