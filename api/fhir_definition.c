@@ -308,7 +308,8 @@ static void put_resource(struct json_out *out, enum fhir_type type)
     put_interaction(out, "read");
     if (searched) put_interaction(out, "search-type");
     json_close_array(out);
-    json_put_string(out, "versioning", "versioned");
+    /* a definition has no meta.versionId */
+    json_put_string(out, "versioning", type < FHIR_DEVICE ? "versioned" : "no-version");
     if (searched) {
         json_open_array(out, "searchParam");
         for (size_t i = 0; i < sizeof search_parameters / sizeof search_parameters[0]; i++) {

@@ -329,6 +329,20 @@ class Fhir(unittest.TestCase):
         self.assertEqual(self.service.get(where).status, 409)
         self.assertEqual(self.emit(self.get('RiskAssessment/' + identity))['status'], 'cancelled')
 
+    def test_what_it_says_it_can_do(self):
+        (rest,) = self.emit(self.get('metadata'))['rest']
+        of = {r['type']: r for r in rest['resource']}
+        for kind in ('RiskAssessment', 'DiagnosticReport'):
+            self.assertEqual([p['name'] for p in of[kind]['searchParam']],
+                             ['subject', 'patient', 'date', '_lastUpdated', 'status', '_id'])
+        definition = self.get('CodeSystem/band')
+        self.assertNotIn('meta', definition.json())
+        self.assertEqual({k: r['versioning'] for k, r in of.items()}, {
+            **dict.fromkeys(('RiskAssessment', 'Observation', 'DiagnosticReport', 'Provenance'),
+                            'versioned'),
+            **dict.fromkeys(('Device', 'OperationDefinition', 'CodeSystem', 'StructureDefinition'),
+                            'no-version')})
+
     def test_times_have_capital_letters(self):
         sent = side(F=360, measured_at='2026-03-01t09:30:00.5z')
         identity = self.service.ask('POST', '/v1/assessments', sent, {'Prefer': 'wait=60'}).json()['id']
