@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Bundles the clinic page into dist/: index.html and its like in other languages, assets/app.js, assets/app.css and, as a file of
+// Bundles the clinic page into dist/: index.html, list.html, result.html and their like in other languages, assets/app.js, assets/app.css and, as a file of
 // its own that is fetched only when somebody opens the 3-D view, assets/view3d.js. The names carry
 // no hash: the daemon serves them with an ETag, so a browser asks once and keeps what it has.
 import { build } from 'esbuild';
@@ -100,34 +100,50 @@ const bundle = async (entry, out) =>
 const html = (text) =>
   text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]);
 
-/* index.html in one language: {{key}}, or {{key|name=value|…}} for a string that names values. */
-function in_language(template, tag, all) {
-  const mark = all[tag]['number.decimal'];
-  const link = ([code, of]) =>
-    `<a href="/?lang=${code}" lang="${code}" hreflang="${code}"` +
-    `${code === tag ? ' aria-current="true"' : ''}>${html(of['language.name'])}</a>`;
-  const parts = { language: tag, languages: Object.entries(all).map(link).join(' ') };
+/* A template in one language: {{key}}, or {{key|name=value|…}} for a string that names values;
+ * `parts` are put in as they are. */
+function in_language(template, words, parts) {
   return template.replace(/\{\{([^{}]+)\}\}/g, (_, inside) => {
     const [key, ...given] = inside.split('|');
     if (key in parts) return parts[key];
     const values = Object.fromEntries(given.map((g) => g.split('=')));
-    if (all[tag][key] === undefined) throw new Error(`index.html: no word ${key}`);
-    return html(all[tag][key].replace(/\{(\w+)\}/g, (__, name) => values[name].replace('.', mark)));
+    if (words[key] === undefined) throw new Error(`no word ${key}`);
+    const mark = words['number.decimal'];
+    return html(words[key].replace(/\{(\w+)\}/g, (__, name) => values[name].replace('.', mark)));
   });
 }
 
-/* index.html is English, index.fr.html French: the daemon sends the one that the reader wants. */
-async function write_pages() {
-  const template = await readFile(join(here, 'index.html'), 'utf8');
+/* To the same address in each language. */
+function language_links(tag, all) {
+  const link = ([code, of]) =>
+    `<a href="?lang=${code}" lang="${code}" hreflang="${code}"` +
+    `${code === tag ? ' aria-current="true"' : ''}>${html(of['language.name'])}</a>`;
+  return Object.entries(all).map(link).join(' ');
+}
+
+async function all_words() {
   const files = (await readdir(join(here, '../words'))).filter((f) => f.endsWith('.json'));
   const all = {};
   for (const file of ['en.json', ...files.filter((f) => f !== 'en.json').sort()])
     all[file.slice(0, -5)] = JSON.parse(await readFile(join(here, '../words', file), 'utf8'));
-  for (const tag of Object.keys(all))
-    await writeFile(
-      join(dist, tag === 'en' ? 'index.html' : `index.${tag}.html`),
-      in_language(template, tag, all),
-    );
+  return all;
+}
+
+/* list.html is English, list.fr.html French: the daemon sends the one that the reader wants. They
+ * differ in what stands there without the script, and a page is called as its heading. */
+async function write_pages() {
+  const shell = await readFile(join(here, 'index.html'), 'utf8');
+  const all = await all_words();
+  for (const name of ['index', 'list', 'result']) {
+    const inside = await readFile(join(here, 'plain', `${name}.html`), 'utf8');
+    for (const [tag, words] of Object.entries(all)) {
+      const main = in_language(inside, words, { language: tag });
+      const title = /<h1>(.*)<\/h1>/.exec(main)[1];
+      const parts = { language: tag, languages: language_links(tag, all), main, title };
+      const file = tag === 'en' ? `${name}.html` : `${name}.${tag}.html`;
+      await writeFile(join(dist, file), in_language(shell, words, parts));
+    }
+  }
 }
 
 await rm(dist, { recursive: true, force: true });

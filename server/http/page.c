@@ -308,28 +308,45 @@ void handle_asset(struct call *call, struct http_response *ret)
     page_asset(call, asset_find(name), ret);
 }
 
-/* "index.html" is English, "index.fr.html" French. */
-static const struct asset *clinic_page(enum language language)
+/* "list.html" is English, "list.fr.html" French. */
+static const struct asset *clinic_page(const char *name, enum language language)
 {
-    char name[24];
-    (void)snprintf(name, sizeof name, "index.%s.html", language_tags[language]);
-    return asset_find(language == LANGUAGE_EN ? "index.html" : name);
+    char file[24];
+    const bool english = language == LANGUAGE_EN;
+    (void)snprintf(file, sizeof file, "%s%s%s.html", name, english ? "" : ".",
+                   english ? "" : language_tags[language]);
+    return asset_find(file);
 }
 
-/* The clinic page where the build has one, the plain form where it has not. */
+/* False where the build has no clinic page. */
+static bool send_clinic_page(struct call *call, const char *name, struct http_response *ret)
+{
+    const struct asset *page = clinic_page(name, reply_language(call->request));
+    if (page == NULL) return false;
+    reply_put_language(call->request, ret);
+    page_asset(call, page, ret);
+    return true;
+}
+
 void handle_home(struct call *call, struct http_response *ret)
 {
-    const struct asset *page = clinic_page(reply_language(call->request));
-    if (page != NULL) {
-        reply_put_language(call->request, ret);
-        page_asset(call, page, ret);
-    } else if (call->id_text[0] != '\0') {
-        ret->status = 303;
-        http_header(ret, "Location", "/v1/assessments/%s/report%s", call->id_text,
-                    call->lang_query);
-    } else {
-        page_form(call, NULL, 0, NULL, ret);
-    }
+    if (!send_clinic_page(call, "index", ret)) page_form(call, NULL, 0, NULL, ret);
+}
+
+void handle_past(struct call *call, struct http_response *ret)
+{
+    if (!send_clinic_page(call, "list", ret)) page_form(call, NULL, 0, NULL, ret);
+}
+
+/* "?plain=1": for who has no script. The page is the same file for every assessment and so cannot
+ * link to the report of this one; it links to its own address. */
+void handle_result(struct call *call, struct http_response *ret)
+{
+    char text[8];
+    const bool plain = query_find(call->request->query, "plain", text, sizeof text) != QUERY_ABSENT;
+    if (!plain && send_clinic_page(call, "result", ret)) return;
+    ret->status = 303;
+    http_header(ret, "Location", "/v1/assessments/%s/report%s", call->id_text, call->lang_query);
 }
 
 void handle_form(struct call *call, struct http_response *ret)

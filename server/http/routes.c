@@ -143,10 +143,10 @@ const struct route routes[] = {
      NULL, true},
     {HTTP_GET, "/form", "GET /form", handle_form, 0, 0, NULL, TYPES("text/html"), TYPES("lang"),
      NULL, true},
-    {HTTP_GET, "/assessments", "GET /assessments", handle_home, 0, 0, NULL, TYPES("text/html"),
+    {HTTP_GET, "/assessments", "GET /assessments", handle_past, 0, 0, NULL, TYPES("text/html"),
      TYPES("subject", "side", "status", "limit", "cursor", "with", "lang"), NULL, true},
-    {HTTP_GET, "/assessments/{id}", "GET /assessments/{id}", handle_home, 0, 0, NULL,
-     TYPES("text/html"), TYPES("with", "lang"), NULL, true},
+    {HTTP_GET, "/assessments/{id}", "GET /assessments/{id}", handle_result, 0, 0, NULL,
+     TYPES("text/html"), TYPES("with", "lang", "plain"), NULL, true},
     {HTTP_GET, "/assets/{file}", "GET /assets/{file}", handle_asset, 0, 0, NULL, NULL, NULL, NULL,
      true},
 };

@@ -67,6 +67,6 @@ route_handler handle_openapi, handle_docs, handle_health, handle_ready, handle_m
 route_handler handle_fhir_metadata, handle_fhir_read, handle_fhir_search, handle_fhir_assess,
     handle_fhir_async, handle_fhir_cancel;
 route_handler handle_cds_discovery, handle_cds_hook, handle_cds_feedback;
-route_handler handle_home, handle_form, handle_asset;
+route_handler handle_home, handle_past, handle_result, handle_form, handle_asset;
 
 #endif

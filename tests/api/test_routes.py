@@ -642,12 +642,20 @@ class Routes(unittest.TestCase):
             self.assertIn("default-src 'none'", policy)
             self.assertNotIn('unsafe', policy)
             page = answer.body.decode()
-            self.assertEqual(re.findall(r'(?:src|href)="(?!/|#)[^"]*"', page), [], path)
+            self.assertEqual(re.findall(r'(?:src|href)="(?!/(?!/)|[?#])[^"]*"', page), [], path)
             self.assertEqual(
                 re.findall(r'<script(?!(?: type="module")? src=)|<style|\son\w+=|style="', page), [], path
             )
             for name in re.findall(r'(?:src|href)="(/assets/[^"]*)"', page):
                 self.assertEqual(self.service.get(name).status, 200, name)
+
+    def test_a_result_without_a_script_leads_to_its_report(self):
+        identity = '0192f0c1-0000-7000-8000-000000000001'
+        for query, language in (('plain=1', ''), ('plain=1&lang=fr', '?lang=fr')):
+            answer = self.service.get(f'/assessments/{identity}?{query}')
+            self.assertEqual(answer.status, 303)
+            report = f'/v1/assessments/{identity}/report{language}'
+            self.assertEqual(answer.headers['Location'], report)
 
     def test_the_plain_form_lists_every_parameter(self):
         page = self.service.get('/form').body.decode()

@@ -133,7 +133,7 @@ test('the page without JavaScript is there in every language, with no word left 
     const low = String(accepted.min).replace('.', words[tag]['number.decimal']);
     assert.ok(html.includes(`${low} `), `${tag}: ${low}`);
     assert.ok(html.includes(words[tag]['daemon.param.muM.name']), tag);
-    for (const other of languages) assert.ok(html.includes(`href="/?lang=${other}"`), other);
+    for (const other of languages) assert.ok(html.includes(`href="?lang=${other}"`), other);
   }
 });
 

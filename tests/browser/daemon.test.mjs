@@ -60,6 +60,9 @@ async function submit_sample(force, resolution = 'coarse') {
   return [url.pathname.split('/')[2], url.searchParams.get('with')];
 }
 
+const numbers_of = (side) =>
+  Object.fromEntries(Object.entries(side).map(([key, text]) => [key, Number(text)]));
+
 const all_ended = (n) =>
   page.waitForFunction((k) => document.querySelectorAll('.glance').length === k, n, {
     timeout: solve_ms,
@@ -191,15 +194,11 @@ test('without JavaScript: limits, a comma, a fault beside its field, then the re
 });
 
 test('without JavaScript: waiting, cancelled, and what is read aloud of both', async () => {
-  const slow = { ...sample.left, F: 257.5, resolution: 'fine' };
-  const numbers = Object.entries(slow).map(([key, value]) => [
-    key,
-    key === 'resolution' ? value : Number(value),
-  ]);
+  const slow = { ...numbers_of(sample.left), F: 257.5, resolution: 'fine' };
   const answer = await fetch(`${origin}/v1/assessments`, {
     method: 'POST',
     headers: { 'Content-Type': 'application/json' },
-    body: JSON.stringify(Object.fromEntries(numbers)),
+    body: JSON.stringify(slow),
   });
   const { id } = await answer.json();
   await page.goto(`${origin}/v1/assessments/${id}/report`);
@@ -208,6 +207,22 @@ test('without JavaScript: waiting, cancelled, and what is read aloud of both', a
   await page.getByRole('button', { name: 'Cancel' }).click();
   await page.getByText('There is no result.').waitFor();
   await assert_accessible(page, 'the report of a cancelled assessment');
+});
+
+test('without JavaScript the address of a result leads to its report', async () => {
+  const answer = await fetch(`${origin}/v1/assessments`, {
+    method: 'POST',
+    headers: { 'Content-Type': 'application/json' },
+    body: JSON.stringify({ ...numbers_of(sample.left), resolution: 'coarse' }),
+  });
+  const { id } = await answer.json();
+  const plain = await watched_page(browser, origin, { javaScriptEnabled: false, locale: 'de' });
+  await plain.goto(`${origin}/assessments/${id}`);
+  await plain.getByRole('link', { name: 'Bericht' }).click();
+  await plain.waitForURL(`**/v1/assessments/${id}/report?lang=de`);
+  assert.match(await plain.locator('body').innerText(), new RegExp(id));
+  assert_clean(plain);
+  await plain.context().close();
 });
 
 test('the report of the daemon is one A4 page and has all that a report must', async () => {

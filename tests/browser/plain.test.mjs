@@ -2,6 +2,7 @@
 // The page where JavaScript is off, or never arrives.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
+import { readFile } from 'node:fs/promises';
 import { assert_accessible, sample, stage } from './browser.mjs';
 import { parameters } from './stand_in.mjs';
 
@@ -38,6 +39,25 @@ test('a plain submit is answered with the report of the new assessment', async (
   assert.equal(document.parameters.F, 258);
   await page.context().close();
 });
+
+for (const tag of ['en', 'de', 'fr'])
+  test(`without the script a result and the list say what there is, in ${tag}`, async () => {
+    const text = await readFile(new URL(`../../words/${tag}.json`, import.meta.url), 'utf8');
+    const words = JSON.parse(text);
+    const page = await s.page({ javaScriptEnabled: false, locale: tag });
+    await page.goto(`${s.origin}/assessments/0192f0c1?with=0192f0c2`);
+    assert.equal(await page.locator('h1').innerText(), words['result.title']);
+    assert.ok(await page.getByText(words['plain.result']).isVisible());
+    await page.getByRole('link', { name: words['result.file.report'] }).click();
+    await page.waitForURL(`**/v1/assessments/0192f0c1/report?lang=${tag}`);
+
+    await page.goto(`${s.origin}/assessments?subject=P-017`);
+    assert.equal(await page.locator('h1').innerText(), words['list.title']);
+    assert.ok(await page.getByText(words['plain.list']).isVisible());
+    await page.getByRole('link', { name: words['plain.list.data'] }).click();
+    await page.waitForURL('**/v1/assessments');
+    await page.context().close();
+  });
 
 test('when the script does not arrive the plain form appears, and is accessible', async () => {
   const page = await s.page();

@@ -17,6 +17,13 @@ export const csp =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; " +
   "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
 
+/* The files of the clinic page, by address. */
+const pages = [
+  [/^\/$/, 'index'],
+  [/^\/assessments\/?$/, 'list'],
+  [/^\/assessments\//, 'result'],
+];
+
 /* Names and descriptions are not the daemon's, so that what the page takes from it can be told. */
 const parameter = (key, unit, description, accepted, studied, sd) => ({
   key,
@@ -439,6 +446,10 @@ export class StandIn {
       const key = url.searchParams.get('parameter');
       return this.json(response, 200, what_if_of(await body_of(request), key, this.emulator));
     }
+    if (url.pathname.startsWith('/assessments/') && url.searchParams.has('plain')) {
+      const report = `/v1${url.pathname}/report?lang=${tag}`;
+      return response.writeHead(303, { Location: report }).end();
+    }
     if (url.pathname === '/v1/assessments' && request.method === 'POST')
       return this.create(request, response);
     if (url.pathname === '/v1/assessments') return this.list(url, request, response);
@@ -548,6 +559,7 @@ export class StandIn {
     const parts = {
       cancel: () => {
         document.status = 'cancelled';
+        document.finished_at = new Date().toISOString();
         this.tell(document);
         this.json(response, 202, document);
       },
@@ -586,9 +598,9 @@ export class StandIn {
       '.svg': 'image/svg+xml',
       '.txt': 'text/plain',
     };
-    const page = path === '/' || /^\/assessments(\/|$)/.test(path);
-    const index = ['fr', 'de'].includes(tag) ? `index.${tag}.html` : 'index.html';
-    const name = page ? index : normalize(path).replace(/^(\.\.)+/, '');
+    const page = pages.find(([pattern]) => pattern.test(path))?.[1];
+    const of_page = ['fr', 'de'].includes(tag) ? `${page}.${tag}.html` : `${page}.html`;
+    const name = page ? of_page : normalize(path).replace(/^(\.\.)+/, '');
     try {
       const bytes = await readFile(join(this.dist, name));
       response.writeHead(200, {

@@ -49,8 +49,9 @@ def languages_say_the_same(tree):
 
 
 def used_by_the_page(tree):
-    files = tree.named(".ts", ".tsx", rooms=("static/src/",)) + ["static/index.html"]
-    text = "\n".join(tree.text(f) for f in files if f in tree.files)
+    files = tree.named(".ts", ".tsx", rooms=("static/src/",)) + tree.named(
+        ".html", rooms=("static/",))
+    text = "\n".join(tree.text(f) for f in files)
     literal = set(re.findall(r"""['"`{]([a-zA-Z]\w*(?:\.\w+)+)['"`}|]""", text))
     beginnings = set(re.findall(r"`((?:\w+\.)+)\$\{", text))
     return literal, beginnings
