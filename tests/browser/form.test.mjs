@@ -99,6 +99,7 @@ test('swapped radii are noticed and swapped back with one click', async () => {
   await leave();
   assert.match(await text_of('left', 'R2'), /Smaller than R1/);
   await page.click('text=Swap R1 and R2');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'left-R2');
   assert.equal(await page.inputValue('#left-R1'), '9');
   assert.equal(await page.inputValue('#left-R2'), '14');
   assert.equal(await text_of('left', 'R2').then((t) => /Smaller/.test(t)), false);
@@ -260,6 +261,14 @@ test('what only the server refuses is shown beside the field', async () => {
   assert.match(await text_of('left', 'muM'), /refused by the server alone/);
   await page.fill('#left-muM', '7');
   assert.equal(await text_of('left', 'muM'), '= 7 kPa');
+});
+
+test('a service that is shutting down is not called a full queue', async () => {
+  await fill_side(page, 'left');
+  const stopping = { status: 503, json: { detail: 'The service is shutting down.' } };
+  await page.route('**/v1/assessments', (route) => route.fulfill(stopping));
+  await page.click('button[type=submit]');
+  assert.match(await page.locator('.errors').innerText(), /does not answer. Nothing is lost/);
 });
 
 test('a full queue loses nothing', async () => {
@@ -472,6 +481,24 @@ async function again(...bodies) {
   await page.waitForFunction((at) => document.querySelector(`#${at}-R1`)?.value, side);
 }
 
+test('an earlier assessment that cannot be read is waited for, and an erased one is said', async () => {
+  const numbers = Object.entries(sample.left).map(([key, text]) => [key, Number(text)]);
+  const { id } = s.daemon.add({ ...Object.fromEntries(numbers), side: 'left' });
+  await page.route('**/v1/assessments/*', (route) => route.abort());
+  await page.goto(`${s.origin}/?from=${id}`);
+  await page.locator('.errors', { hasText: 'earlier assessment cannot be read' }).waitFor();
+  assert.equal(await page.locator('#left-R1').count(), 0);
+  await page.unroute('**/v1/assessments/*');
+  await page.getByRole('button', { name: 'Try again' }).click();
+  await page.locator('#left-R1').waitFor();
+  assert.equal(await page.inputValue('#left-R1'), '7.1');
+
+  await page.goto(`${s.origin}/?from=gone`);
+  await page.locator('.errors', { hasText: 'There is no such assessment.' }).waitFor();
+  await fill_side(page, 'left');
+  assert.equal(await page.locator('.errors').count(), 0);
+});
+
 test('what belongs to an earlier assessment comes with its numbers', async () => {
   const body = { subject: 'again-2', resolution: 'fine', measured_at: '2026-01-10T09:30:00Z' };
   await again(
@@ -497,6 +524,7 @@ test('what the form has no place for is said not to be taken over', async () => 
   await assert_accessible(page, 'the form with an earlier assessment');
   await page.click('text=Clear');
   assert.equal(await page.locator('.left-behind').count(), 0);
+  assert.equal(await page.locator('#announcer').innerText(), 'The form is empty.');
 });
 
 test('two assessments that are no pair never stand in one form', async () => {

@@ -4,7 +4,7 @@
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { get_parameters, type Parameters } from '../api.js';
 import { use_emulator } from '../emulator.js';
-import { language, t, t_or } from '../i18n.js';
+import { language, t, t_or, type Key } from '../i18n.js';
 import type { Assessment, Side } from '../types.js';
 import { Shape } from '../ui.js';
 import { Deviations, DeviationFields } from './deviations.js';
@@ -68,13 +68,13 @@ function use_parameters(): [Parameters | null, boolean, () => void] {
   return [parameters, failed, load];
 }
 
-function Loading(props: { failed: boolean; again: () => void }) {
+function Loading(props: { failed: Key | null; again: () => void }) {
   return (
     <>
       <h1 tabIndex={-1}>{t('form.title')}</h1>
       {props.failed ? (
         <div class="errors" role="alert">
-          <p>{t('form.loading.failed')}</p>
+          <p>{t(props.failed)}</p>
           <button type="button" onClick={props.again}>
             {t('form.retry')}
           </button>
@@ -110,7 +110,15 @@ export function FormPage(props: { from: string[] }) {
   const [parameters, failed, again] = use_parameters();
   const form = use_form(parameters, props.from);
   const previews = use_emulator();
-  if (!parameters) return <Loading failed={failed} again={again} />;
+  /* An empty form would take what is typed, and lose it when the earlier numbers come. */
+  if (!parameters || form.loading) {
+    const unread = form.unread ? 'form.earlier.failed' : null;
+    const try_again = (): void => {
+      again();
+      form.load_earlier();
+    };
+    return <Loading failed={failed ? 'form.loading.failed' : unread} again={try_again} />;
+  }
   const { person, entries, failure, sending } = form;
   const send = (e: Event): void => {
     e.preventDefault();

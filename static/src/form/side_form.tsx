@@ -6,7 +6,7 @@ import { t } from '../i18n.js';
 import type { Parameters } from '../api.js';
 import type { ParameterInfo, Side } from '../types.js';
 import { Drawing } from './drawing.js';
-import { Field } from './field.js';
+import { Field, field_id } from './field.js';
 import { Preview } from './preview.js';
 import { finding, value_of, type Finding, type SideEntry } from './model.js';
 
@@ -54,8 +54,13 @@ export function SideForm(props: SideFormProps) {
     </label>
   );
 
+  /* The button goes with the fault: who stood on it goes on in its field. */
+  const swap = (): void => {
+    props.on_change(swapped(entry));
+    document.getElementById(field_id(side, 'R2'))?.focus();
+  };
   const swap_button = (
-    <button type="button" class="inline" onClick={() => props.on_change(swapped(entry))}>
+    <button type="button" class="inline" onClick={swap}>
       {t('fault.swap')}
     </button>
   );

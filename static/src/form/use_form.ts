@@ -53,7 +53,7 @@ const stiffness = ['muM', 'muF'];
 
 function failure_of(e: ApiError): Failure {
   const until = 'sent';
-  if (e.status === 429 || e.status === 503) return { key: 'form.error.busy', until };
+  if (e.status === 429) return { key: 'form.error.busy', until };
   if (e.status === 0 || e.status >= 502) return { key: 'form.error.unreachable', until };
   const access = access_key(e);
   if (access) return { key: access, until };
@@ -75,6 +75,7 @@ function use_sender(): (body: ReturnType<typeof submission>) => Promise<string> 
 export function use_form(parameters: Parameters | null, from: string[]) {
   const [draft] = useState(draft_here);
   const [loading, set_loading] = useState(!draft && from.length > 0);
+  const [unread, set_unread] = useState(false);
   const [earlier, set_earlier] = useState<Assessment[]>(draft?.earlier ?? []);
   const [person, set_person] = useState<Person>(draft?.person ?? nobody);
   const [entries, set_entries] = useState<Entries>(draft?.entries ?? nothing);
@@ -104,12 +105,23 @@ export function use_form(parameters: Parameters | null, from: string[]) {
     if (used[0]) restart(entries_of(used), person_of(used[0]), used);
   };
 
-  useEffect(() => {
+  const load_earlier = (): void => {
     if (!loading) return;
-    Promise.all(from.map(get_assessment))
-      .then(start_from, () => undefined /* erased since: the form stays empty */)
-      .finally(() => set_loading(false));
-  }, [from.join()]);
+    set_unread(false);
+    Promise.all(from.map(get_assessment)).then(
+      (documents) => {
+        start_from(documents);
+        set_loading(false);
+      },
+      (e: unknown) => {
+        if (!(e instanceof ApiError)) throw e;
+        if (e.status !== 404) return set_unread(true);
+        set_failure({ key: 'result.not_found', until: 'filled' }); /* erased since */
+        set_loading(false);
+      },
+    );
+  };
+  useEffect(load_earlier, [from.join()]);
 
   /* After every change, and when the same form stands at another address. */
   useLayoutEffect(() => {
@@ -192,7 +204,15 @@ export function use_form(parameters: Parameters | null, from: string[]) {
     if (ids) navigate(result_address(ids));
   };
 
+  const clear = (): void => {
+    restart(nothing(), nobody);
+    announce(t('form.cleared'));
+  };
+
   return {
+    loading,
+    unread /* what the form is to start from */,
+    load_earlier,
     earlier,
     person,
     entries,
@@ -205,6 +225,6 @@ export function use_form(parameters: Parameters | null, from: string[]) {
     copy_stiffness,
     fill_sample,
     send,
-    clear: (): void => restart(nothing(), nobody),
+    clear,
   };
 }
