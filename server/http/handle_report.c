@@ -506,8 +506,7 @@ static void put_end(const struct report *r, const struct ischia_case *c, bool wi
                     word_text("time", created)));
     if (finished[0] != '\0') {
         page_put(r->out, " \u00b7 ");
-        page_fill(r->out, r->language, WORD_DAEMON_REPORT_ENDED,
-                  WORDS(word_text("time", finished)));
+        page_fill(r->out, r->language, WORD_REPORT_ENDED, WORDS(word_text("time", finished)));
     }
     put_settings(r, c);
     page_put(r->out, "</p>\n");

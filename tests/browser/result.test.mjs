@@ -38,6 +38,9 @@ async function compute(subject, sides = ['left', 'right'], options = {}) {
   await page.waitForURL('**/assessments/**');
 }
 
+/* A side for assessments that were never entered in the form. */
+const numbers = { R1: 7.1, R2: 22.8, eM: 31, eF: 10, muM: 8, muF: 5, F: 258 };
+
 const all_ended = (n) =>
   page.waitForFunction((k) => document.querySelectorAll('.glance').length === k, n);
 
@@ -96,7 +99,18 @@ test('progress is followed, and cancel stops it', async () => {
   await page.locator('.no-result').waitFor();
   assert.equal(await page.evaluate(() => document.activeElement.innerText), 'Left');
   assert.match(await page.locator('.no-result').innerText(), /Cancelled/);
+  assert.match(await page.locator('.card header').innerText(), /ended/);
+  assert.doesNotMatch(await page.locator('.card header').innerText(), /computed/);
   await assert_accessible(page, 'a cancelled assessment');
+});
+
+test('who may not cancel is told so, and the computation goes on', async () => {
+  const refusal = { status: 403, json: { detail: "This needs a token with the scope 'assess'." } };
+  await page.route('**/cancel', (route) => route.fulfill(refusal));
+  await compute('slow-2', ['left']);
+  await page.getByRole('button', { name: 'Cancel' }).click();
+  await page.locator('.running .errors', { hasText: 'access does not allow this' }).waitFor();
+  assert.equal(await page.getByRole('progressbar').count(), 1);
 });
 
 test('a failed solve shows the reason and no number', async () => {
@@ -215,6 +229,15 @@ test('history of the same subject, and the list, its filter and its comparison',
   await page.locator('svg.history').waitFor();
   assert.equal(await page.locator('section:has(#history) tbody tr').count(), 2);
   await assert_accessible(page, 'the result with a history');
+  /* One that was measured long ago and entered last. */
+  s.daemon.add({ ...numbers, side: 'left', subject: 'P-4', measured_at: '2025-11-10' });
+  await page.reload();
+  await page.locator('svg.history').waitFor();
+  const times = await page.locator('section:has(#history) tbody th').allInnerTexts();
+  assert.deepEqual(
+    times.map((text) => text.replace(' (this one)', '')),
+    ['10 Mar 2026', '10 Jan 2026', '10 Nov 2025'],
+  );
 
   await page.click('text=Past assessments');
   await page.locator('table.list').waitFor();
@@ -222,9 +245,9 @@ test('history of the same subject, and the list, its filter and its comparison',
   await page.fill('#f-subject', 'P-4');
   await page.click('text=Show');
   await page.waitForURL('**/assessments?subject=P-4');
-  await page.waitForFunction(() => document.querySelectorAll('table.list tbody tr').length === 2);
+  await page.waitForFunction(() => document.querySelectorAll('table.list tbody tr').length === 3);
   await assert_accessible(page, 'the filtered list');
-  for (const box of await page.locator('table.list input').all()) await box.check();
+  for (const i of [1, 2]) await page.locator('table.list input').nth(i).check();
   await page.click('text=Compare the two selected');
   await all_ended(2);
   assert.equal(await page.locator('h1').innerText(), 'Comparison');
@@ -488,6 +511,16 @@ test('a screen reader hears the answer, then its limits, then the pictures', asy
     assert.ok(next >= at, `${part} is not where it should be:\n${heard}`);
     at = next + part.length;
   }
+});
+
+test('Show reads the list again, also under the same filter', async () => {
+  await page.route('**/v1/assessments?*', (route) => route.abort());
+  await page.goto(`${s.origin}/assessments`);
+  await page.locator('.errors', { hasText: 'does not answer' }).waitFor();
+  await page.unroute('**/v1/assessments?*');
+  await page.click('text=Show');
+  await page.locator('table.list').waitFor();
+  assert.equal(await page.locator('.errors').count(), 0);
 });
 
 test('a phone shows everything without sideways scrolling', async () => {

@@ -40,7 +40,9 @@ function use_page(query: URLSearchParams): UsedPage {
     return () => {
       overtaken = true;
     };
-  }, [query.toString()]);
+  }, [
+    query,
+  ]); /* a new one with every move, also to the same address: then the list is read again */
   return [page, fault, (e) => set_fault(fault_text(e))];
 }
 

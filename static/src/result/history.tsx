@@ -18,6 +18,10 @@ const inset = 22;
 const day_ms = 24 * 3600 * 1000; /* two sides of one visit make no history */
 const time_of = (d: Assessment): string => d.measured_at ?? d.created_at;
 
+/* As measured: an old visit may have been entered late. */
+const newest_first = (items: Assessment[]): Assessment[] =>
+  [...items].sort((a, b) => Date.parse(time_of(b)) - Date.parse(time_of(a)));
+
 /* Read again whenever one more of the assessments shown has ended. */
 function use_history(subject: string | null, ended: number): Assessment[] | null {
   const [items, set] = useState<Assessment[] | null>(null);
@@ -25,7 +29,7 @@ function use_history(subject: string | null, ended: number): Assessment[] | null
     if (!subject) return set(null);
     let wanted = true;
     list({ subject, limit: 100 }).then(
-      (page) => wanted && set(page.items),
+      (page) => wanted && set(newest_first(page.items)),
       () => wanted && set([]) /* the history is an extra: the result stands without it */,
     );
     return () => {

@@ -156,7 +156,11 @@ function Meta(props: { of: Assessment }) {
     of.label ?? '',
     of.measured_at ? t('result.measured', { time: format_time(of.measured_at) }) : '',
     ...unusual_text(of),
-    of.finished_at ? t('result.computed', { time: format_time(of.finished_at) }) : '',
+    of.finished_at
+      ? t(of.status === 'succeeded' ? 'result.computed' : 'report.ended', {
+          time: format_time(of.finished_at),
+        })
+      : '',
   ];
   return <p class="hint">{parts.filter(Boolean).join(' · ')}</p>;
 }

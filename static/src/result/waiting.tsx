@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // A side that has no result, yet or ever: where it stands, why it ended.
-import { useLayoutEffect, useRef } from 'preact/hooks';
-import { cancel } from '../api.js';
-import { format, t } from '../i18n.js';
+import { useLayoutEffect, useRef, useState } from 'preact/hooks';
+import { access_key, ApiError, cancel } from '../api.js';
+import { format, t, type Key } from '../i18n.js';
 import type { Followed } from '../follow.js';
 import type { Assessment } from '../types.js';
 import { Shape } from '../ui.js';
@@ -29,10 +29,16 @@ export function Running(props: { state: Followed; name: string; on_cancelled: ()
     },
     [],
   );
+  const [refused, set_refused] = useState<Key | null>(null);
   if (!document) return <p class="loading">{t('result.loading')}</p>;
   const fraction = state.progress?.fraction ?? document.progress;
-  /* When the daemon cannot be reached the follower already says so. */
-  const stop = (): void => void cancel(document.id).then(props.on_cancelled, props.on_cancelled);
+  /* When the daemon cannot be reached, or it is over already, the follower says so. */
+  const stop = (): void => {
+    set_refused(null);
+    cancel(document.id)
+      .catch((e: unknown) => set_refused((e instanceof ApiError && access_key(e)) || null))
+      .then(props.on_cancelled);
+  };
   return (
     <div class="running">
       <p>{progress_text(state)}</p>
@@ -40,6 +46,11 @@ export function Running(props: { state: Followed; name: string; on_cancelled: ()
       <button type="button" ref={button} onClick={stop}>
         {t('result.cancel')}
       </button>
+      {refused && (
+        <p class="errors" role="alert">
+          {t(refused)}
+        </p>
+      )}
     </div>
   );
 }
