@@ -523,6 +523,66 @@ test('Show reads the list again, also under the same filter', async () => {
   assert.equal(await page.locator('.errors').count(), 0);
 });
 
+/* In a theme of high contrast the page's own colours are not there to be seen on. */
+test('drawings take the colours that the reader has set', async () => {
+  await compute('P-8', ['left'], { measured_at: '2026-01-10' });
+  await all_ended(1);
+  await page.emulateMedia({ forcedColors: 'active', colorScheme: 'dark' });
+  const ink = await page.evaluate(() => getComputedStyle(document.body).color);
+  for (const words of ['.curve .name', '.curve .tick', '.curve text.threshold', '.strip .tick'])
+    assert.equal(
+      await page
+        .locator(words)
+        .first()
+        .evaluate((e) => getComputedStyle(e).fill),
+      ink,
+      words,
+    );
+  const pressed = page.locator('.switch button');
+  const grounds = await pressed.evaluateAll((all) =>
+    all.map((e) => getComputedStyle(e).backgroundColor),
+  );
+  assert.notEqual(grounds[0], grounds[1]);
+});
+
+test('codes and labels of one long word stay on the page', async () => {
+  const long = { subject: 'x'.repeat(64), label: 'Wumpus'.repeat(33) };
+  const ids = ['left', 'right'].map((side) => s.daemon.add({ ...numbers, side, ...long }).id);
+  for (const width of [1366, 320]) {
+    await page.setViewportSize({ width, height: 800 });
+    await page.goto(`${s.origin}/assessments/${ids[0]}?with=${ids[1]}`);
+    await all_ended(2);
+    await page.locator('#history').waitFor();
+    const out = await page.evaluate(() =>
+      [...document.querySelectorAll('.card header *, #history')]
+        .filter((e) => {
+          const text = document.createRange();
+          text.selectNodeContents(e);
+          return (
+            text.getBoundingClientRect().right > e.closest('section').getBoundingClientRect().right
+          );
+        })
+        .map((e) => e.textContent),
+    );
+    assert.deepEqual(out, [], `${width}`);
+  }
+});
+
+test('the smallest phone shows the longest name of the form whole', async () => {
+  await page.setViewportSize({ width: 320, height: 640 });
+  await open_form(page, s.origin);
+  const wide = 'Muskelsteifigkeit';
+  const covered = await page.evaluate((word) => {
+    const label = document.querySelector('label[for=left-muM]');
+    label.lastChild.textContent = word;
+    const text = document.createRange();
+    text.selectNodeContents(label.lastChild);
+    const help = label.parentElement.querySelector('.help').getBoundingClientRect();
+    return text.getBoundingClientRect().right > help.left;
+  }, wide);
+  assert.equal(covered, false);
+});
+
 test('a phone shows everything without sideways scrolling', async () => {
   await page.setViewportSize({ width: 390, height: 844 });
   await compute('P-7');
