@@ -72,7 +72,6 @@ async function all_of(page, size, result) {
   await page.locator('.glance').first().waitFor();
   await page.waitForLoadState('networkidle');
   await drawn(page);
-  await shoot(page, 'result', size);
   await shoot(page, 'result-whole', size, { fullPage: true });
   await page.getByRole('button', { name: '3-D' }).first().click();
   await page.locator('.view3d .loading').waitFor({ state: 'detached' });
