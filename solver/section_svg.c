@@ -64,10 +64,25 @@ struct figure {
 
 enum { NUMBER_BYTES = 32 };
 
+/* ">" too: "]]>" may not stand in XML. */
+static const char *entity_of(char letter)
+{
+    switch (letter) {
+    case '&':
+        return "&amp;";
+    case '<':
+        return "&lt;";
+    case '>':
+        return "&gt;";
+    default:
+        return NULL;
+    }
+}
+
 static void put_words(const struct figure *f, const char *text)
 {
     for (; *text != '\0'; text++) {
-        const char *entity = *text == '&' ? "&amp;" : *text == '<' ? "&lt;" : NULL;
+        const char *entity = entity_of(*text);
         if (entity != NULL)
             (void)fputs(entity, f->out);
         else

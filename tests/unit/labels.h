@@ -7,7 +7,7 @@
 /* What a picture says in no language that anybody speaks. */
 static const struct ischia_section_labels labels = {
     .language = "x-test",
-    .title = "<titel> & co",
+    .title = "<titel> & co ]]>",
     .heading = "overskrift",
     .description = "beskrivelse",
     .plane = {"plan y", "plan x"},

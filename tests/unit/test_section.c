@@ -204,7 +204,7 @@ static void the_drawing_is_whole_and_says_what_it_shows(void **state)
         ">plan x<",
         "10 mm",
         "tøyning",
-        ">&lt;titel> &amp; co<",
+        ">&lt;titel&gt; &amp; co ]]&gt;<",
         "xml:lang=\"x-test\"",
         "R1 6,9 mm",
         "muM 8 kPa",
