@@ -108,7 +108,8 @@ static void write_node_set(FILE *out, const struct mesh *mesh, const char *name,
         if (!(mesh->node_flags[n] & flag) || (mesh->node_flags[n] & excluded)) continue;
         (void)fprintf(out, "%d,%s", n + 1, ++written % LINE_NUMBERS_MAX == 0 ? "\n" : " ");
     }
-    (void)fputc('\n', out);
+    /* No line stays empty: Abaqus reads one as zeros. */
+    if (written % LINE_NUMBERS_MAX != 0) (void)fputc('\n', out);
 }
 
 static void write_bone_equations(FILE *out, const struct mesh *mesh)
