@@ -33,9 +33,11 @@ struct extremes {
     double difference, scale;
 };
 
+/* A difference that is no number stays: fmax would drop it, and what is no number would agree. */
 static void note(struct extremes *e, double analytic, double numeric)
 {
-    e->difference = fmax(e->difference, fabs(analytic - numeric));
+    const double difference = fabs(analytic - numeric);
+    if (difference > e->difference || isnan(difference)) e->difference = difference;
     e->scale = fmax(e->scale, fabs(analytic));
 }
 

@@ -48,9 +48,11 @@ static const char *const fault_names[FAULT_COUNT] = {
 };
 static enum fault fault;
 
+static double factor; /* what the fault multiplies by */
+
 static void spoil(enum fault where, double *value)
 {
-    if (fault == where) *value *= 1 + error_share;
+    if (fault == where) *value *= factor;
 }
 
 void __real_ogden_derivatives(double mu_MPa, double pressure_MPa, const double stretch[3],
@@ -111,11 +113,12 @@ void __wrap_seat_hessian(const struct seat *seat, const double (*u_mm)[3], int n
     spoil(FRICTION_STIFFNESS, &ret[1][1]);
 }
 
-static enum ischia_code check_with(enum fault wrong)
+static enum ischia_code check_with(enum fault wrong, double wrong_factor)
 {
     FILE *out = tmpfile();
     assert_non_null(out);
     fault = wrong;
+    factor = wrong_factor;
     const enum ischia_code code = ischia_check_tangents(out, NULL);
     fault = NO_FAULT;
     assert_int_equal(fclose(out), 0);
@@ -125,15 +128,23 @@ static enum ischia_code check_with(enum fault wrong)
 static void hand_written_tangents_agree_with_differences(void **state)
 {
     (void)state;
-    assert_int_equal(check_with(NO_FAULT), ISCHIA_OK);
+    assert_int_equal(check_with(NO_FAULT, 1), ISCHIA_OK);
 }
 
 static void a_wrong_derivative_is_found_out(void **state)
 {
     (void)state;
     for (int f = NO_FAULT + 1; f < FAULT_COUNT; f++)
-        if (check_with((enum fault)f) != ISCHIA_E_NUMERIC)
+        if (check_with((enum fault)f, 1 + error_share) != ISCHIA_E_NUMERIC)
             fail_msg("an error in %s was not noticed", fault_names[f]);
+}
+
+static void a_derivative_that_is_no_number_is_found_out(void **state)
+{
+    (void)state;
+    for (int f = NO_FAULT + 1; f < FAULT_COUNT; f++)
+        if (check_with((enum fault)f, (double)NAN) != ISCHIA_E_NUMERIC)
+            fail_msg("NaN for %s was not noticed", fault_names[f]);
 }
 
 /* g_i and the quotients at equal stretches against their limits: even = H_ii - H_ij. */
@@ -158,6 +169,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(hand_written_tangents_agree_with_differences),
         cmocka_unit_test(a_wrong_derivative_is_found_out),
+        cmocka_unit_test(a_derivative_that_is_no_number_is_found_out),
         cmocka_unit_test(equal_stretches_are_the_limit_of_unequal_ones),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
