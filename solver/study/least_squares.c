@@ -138,7 +138,8 @@ static void goodness(const double *y, double rss, struct least_squares *fit)
     for (size_t i = 0; i < fit->n; i++) total += (y[i] - mean) * (y[i] - mean);
     fit->mean_square = rss / n;
     fit->r2 = total > 0 ? 1 - rss / total : (double)NAN;
-    fit->r2_adjusted = freedom > 0 ? 1 - (rss / freedom) / (total / (n - 1)) : (double)NAN;
+    fit->r2_adjusted =
+        freedom > 0 && total > 0 ? 1 - (rss / freedom) / (total / (n - 1)) : (double)NAN;
 }
 
 static enum ischia_code fit_with(struct work *w, const double *A, const double *y,

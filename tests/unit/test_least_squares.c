@@ -59,12 +59,23 @@ static void as_many_rows_as_terms_interpolate(void **state)
     least_squares_finish(&fit);
 }
 
+static void a_constant_has_no_variance_to_explain(void **state)
+{
+    (void)state;
+    const double A[] = {1, 1, 1, 1, 0, 1, 2, 5}, y[] = {0.1, 0.1, 0.1, 0.1};
+    struct least_squares fit;
+    assert_int_equal(least_squares_init(&fit, A, y, 4, 2, NULL), ISCHIA_OK);
+    assert_true(isnan(fit.r2) && isnan(fit.r2_adjusted));
+    least_squares_finish(&fit);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(agrees_with_numpy_and_R),
         cmocka_unit_test(dependent_columns_are_refused),
         cmocka_unit_test(as_many_rows_as_terms_interpolate),
+        cmocka_unit_test(a_constant_has_no_variance_to_explain),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
