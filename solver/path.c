@@ -34,7 +34,6 @@ enum {
     PATH_ITERATIONS_MAX = 30,
     SNAP_ITERATIONS_MAX = 300,
     FINAL_ITERATIONS_MAX = 60,
-    LOAD_STEPS_MAX = 150,
     TRIES_MAX = 300,
     SNAP_FACTORISATIONS_MAX = 900
 };
@@ -189,7 +188,7 @@ static void take_way(struct path *p)
 
 static bool may_go_on(const struct path *p)
 {
-    return p->tries < TRIES_MAX && p->report->load_steps < LOAD_STEPS_MAX &&
+    return p->tries < TRIES_MAX && p->report->load_steps < PATH_STEPS_MAX &&
            p->report->factorisations < p->effort.factorisations_max &&
            p->ceiling_mm >= step_floor * p->track.height_mm;
 }

@@ -9,6 +9,8 @@
  * is taken under force control, so that the force is met exactly.
  */
 
+enum { PATH_STEPS_MAX = 150 }; /* load steps of one path */
+
 /* Where the tissue folds, which fold it takes depends on the steps: a path that ends short at one
  * pace may arrive at another. */
 struct path_effort {

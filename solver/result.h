@@ -68,7 +68,7 @@ struct ischia_load_point {
     double E_shear_max;
     double E_comp_max;
 };
-enum { ISCHIA_LOAD_POINTS_MAX = 128 };
+enum { ISCHIA_LOAD_POINTS_MAX = 150 }; /* one for each load step that a path may take */
 
 struct ischia_numerics {
     enum ischia_reason reason;

@@ -168,11 +168,15 @@ static bool report_iteration(void *context, int load_step, int newton_iteration,
     return s->observer->on_progress(s->observer->context, &progress);
 }
 
-/* Forces rise along a load curve; a point that does not fit, or does not rise, is left out. */
+_Static_assert((int)PATH_STEPS_MAX <= (int)ISCHIA_LOAD_POINTS_MAX,
+               "the last step, at the whole force, has its place on the load curve");
+
+/* Forces rise along a load curve; a point that does not rise is left out. */
 static void add_load_point(struct trial *t, const struct ischia_load_point *point)
 {
     const double last_N = t->points > 0 ? t->curve[t->points - 1].F_N : 0;
-    if (t->points < ISCHIA_LOAD_POINTS_MAX && point->F_N > last_N) t->curve[t->points++] = *point;
+    assert(t->points < ISCHIA_LOAD_POINTS_MAX);
+    if (point->F_N > last_N) t->curve[t->points++] = *point;
 }
 
 /* One point of the load curve. */
