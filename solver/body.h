@@ -63,7 +63,7 @@ void body_reset_pressure(struct body *body, const double (*u_mm)[3]);
  * ret[node], N mm. */
 void body_shear_of_nodes(const struct body *body, double *ret_Nmm);
 
-/* Smallest det F over all integration points. */
+/* Smallest det F over all points of the rule, corners of elements included. */
 double body_det_F_min(const struct body *body, const double (*u_mm)[3]);
 
 #endif

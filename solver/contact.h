@@ -50,7 +50,8 @@ bool contact_is_stable(struct contact *contact, const struct seat *seat);
 
 /*
  * Solves from the state u with the seat's contact forces as the first guess. ret_du[rows]; *ret_dd;
- * ret_normal_N[node] is set for the nodes that rest. Returns false when there is no solution.
+ * ret_normal_N[node] is set for the nodes that rest. Returns false when there is no solution; true
+ * also when the guesses go round, with the last of a dozen: the next Newton step starts from it.
  */
 bool contact_solve(struct contact *contact, const struct seat *seat, const double (*u_mm)[3],
                    enum contact_friction friction, double *ret_du, double *ret_dd,

@@ -65,7 +65,7 @@ struct element_tangent {
 
 /*
  * Strain energy in N mm; HUGE_VAL when det F <= 0 at a point or a corner, and then *ret is
- * undefined. ret NULL: the energy alone. tangent NULL: ret->force alone.
+ * undefined. ret NULL: the energy alone. tangent NULL: ret->force and ret->pressure_MPa alone.
  */
 double element_energy(const struct element_reference *ref, const struct element_material *material,
                       const double u_mm[HEX_NODES][3], const struct element_tangent *tangent,

@@ -68,8 +68,8 @@ int mesh_local_node_count(const struct mesh_divisions *divisions);
 
 void mesh_finish(struct mesh *mesh); /* frees the arrays; a zeroed mesh is allowed */
 
-/* True when indices are in range, every element has positive volume at its corners and centre,
- * and every node belongs to an element. */
+/* True when the elements' nodes and tissues are in range, every element has positive volume at its
+ * corners, and every node belongs to an element. False also when there is no memory to look. */
 bool mesh_is_valid(const struct mesh *mesh);
 
 #endif

@@ -100,7 +100,7 @@ static void rim_build(struct local_geometry *g)
 {
     double scratch[3 * (RIM_SAMPLES + 1)];
     for (int i = 0; i <= RIM_SAMPLES; i++) {
-        /* Quadratic crowding towards both ends follows the outline's blunt corner at y = R1. */
+        /* Crowded towards y = R1, to follow the outline's blunt corner there. */
         const double angle = M_PI_2 * i / RIM_SAMPLES;
         const double y = g->R1 * sin(angle);
         g->rim[i][0] = outline_x(g, y);
@@ -317,7 +317,7 @@ static void place_nodes(struct mesh *m, const struct local_geometry *g)
         for (int i = 0; i <= d->across; i++) place_column(m, g, i, j);
 }
 
-/* Snaps the symmetry planes and outer faces to exact coordinates and flags the nodes. */
+/* Snaps the symmetry planes to exact coordinates and flags the nodes. */
 static void flag_nodes(struct mesh *m, const struct local_geometry *g)
 {
     const double eps = 1e-9 * g->half_width;
@@ -345,7 +345,7 @@ static void add_hex(struct mesh *m, enum tissue tissue, const int lower[4], cons
     m->tissue[m->element_count++] = (unsigned char)tissue;
 }
 
-/* The four nodes of cell (i, j), anticlockwise as seen from below the seat's far side (+z). */
+/* The four nodes of cell (i, j), anticlockwise as seen from the bone. */
 static void muscle_quad(const struct mesh_divisions *d, enum patch patch, int i, int j, int l,
                         int ret[4])
 {

@@ -78,8 +78,8 @@ struct ischia_numerics {
     int newton_iterations;
     int factorisations;
     double force_residual;  /* |unbalanced force| / F, dimensionless                           */
-    double energy_residual; /* |seat work - stored - friction| / seat work, dimensionless      */
-    double det_F_min;       /* over all integration points                                     */
+    double energy_residual; /* (seat work - stored - friction - drag) / seat work, with sign   */
+    double det_F_min;       /* over all integration points and corners of elements             */
     double eps_max_error;   /* estimated discretisation error of eps_max, absolute             */
     double last_converged_F_N;
     double wall_s; /* filled in by the program: the solver has no clock               */

@@ -25,8 +25,9 @@
  *   cluster_volume_mm3 how much of the element's unloaded volume lies in any such cluster; the
  *                      sum times four is the reported volume
  *
- * The seven inputs and the model's name are in the file's field data. Numbers are base64 doubles
- * and integers, little-endian on every machine: the same field gives the same bytes.
+ * The seven inputs are in the file's field data, as text; the model's name and version in a comment
+ * at its top. All other numbers are base64 doubles and integers, little-endian on every machine:
+ * the same field gives the same bytes.
  */
 
 /* displacement_mm: [node_count][3], flat, finite. ISCHIA_E_MEMORY, ISCHIA_E_IO. */
