@@ -65,7 +65,9 @@ static void refuse_unknown(const struct reader *in, const char *const *known)
 static void read_levels(const struct reader *in, struct design_factor *factor)
 {
     const struct json *levels = member_of_type(in, "levels", JSON_ARRAY);
+    const bool has_ends = json_member(in->object, "min") || json_member(in->object, "max");
     double min = (double)NAN, max = (double)NAN;
+    if (levels != NULL && has_ends) return; /* which of them is meant? */
     if (levels == NULL) {
         read_number(in, "min", -1e9, 1e9, false, &min);
         read_number(in, "max", -1e9, 1e9, false, &max);
@@ -158,10 +160,13 @@ static void read_factors(const struct reader *in, struct design *d)
 
 /* ---- the rule ---- */
 
-static bool read_generator(const struct json *list, int *ret)
+/* One number for each of the file's factors. */
+static bool read_generator(const struct json *list, size_t factors, int *ret)
 {
     int f = 0;
-    if (json_type_of(list) != JSON_ARRAY || json_count(list) > DESIGN_FACTORS_MAX) return false;
+    if (json_type_of(list) != JSON_ARRAY || json_count(list) != factors ||
+        factors > DESIGN_FACTORS_MAX)
+        return false;
     for (const struct json *m = json_first(list); m != NULL; m = json_next(m)) {
         if (json_type_of(m) != JSON_NUMBER) return false;
         const double number = json_number(m);
@@ -171,7 +176,7 @@ static bool read_generator(const struct json *list, int *ret)
     return true;
 }
 
-static void read_fraction(const struct reader *rule, struct design *d)
+static void read_fraction(const struct reader *rule, size_t factors, struct design *d)
 {
     static const char *const known[] = {"modulus", "generators", NULL};
     const struct json *object = member_of_type(rule, "fraction", JSON_OBJECT);
@@ -185,12 +190,42 @@ static void read_fraction(const struct reader *rule, struct design *d)
     bool good = modulus >= 2 && list != NULL && json_count(list) <= DESIGN_GENERATORS_MAX;
     const struct json *m = good ? json_first(list) : NULL;
     for (; m != NULL && good; m = json_next(m))
-        good = read_generator(m, d->generator[d->generator_count++]);
+        good = read_generator(m, factors, d->generator[d->generator_count++]);
     if (!good)
         doc_faults_add(in.faults, in.pointer, "malformed",
                        "a fraction needs \"modulus\" and at most %d \"generators\", each a list of "
                        "whole numbers, one a factor",
                        (int)DESIGN_GENERATORS_MAX);
+}
+
+enum { ANY_FRACTION = 1 << DESIGN_FULL | 1 << DESIGN_CENTRAL_COMPOSITE };
+enum { ANY_SEQUENCE = 1 << DESIGN_SOBOL | 1 << DESIGN_HALTON };
+
+/* The members of a rule, and the kinds of design that heed them, as bits. */
+static const struct {
+    const char *key;
+    unsigned kinds;
+} rule_members[] = {
+    {"fraction", ANY_FRACTION},
+    {"axial", 1 << DESIGN_CENTRAL_COMPOSITE},
+    {"points", ANY_SEQUENCE},
+    {"skip", ANY_SEQUENCE},
+    {"seed", ANY_SEQUENCE | 1 << DESIGN_MORRIS},
+    {"paths", 1 << DESIGN_MORRIS},
+    {"levels", 1 << DESIGN_MORRIS},
+};
+
+/* A member that another kind heeds says that the file means something else than it gets. */
+static void refuse_unheeded(const struct reader *in, enum design_kind kind)
+{
+    char pointer[64];
+    for (size_t k = 0; k < sizeof rule_members / sizeof rule_members[0]; k++) {
+        const char *key = rule_members[k].key;
+        if (rule_members[k].kinds >> kind & 1 || json_member(in->object, key) == NULL) continue;
+        doc_faults_add(in->faults, doc_pointer(pointer, sizeof pointer, in->pointer, key),
+                       "not_allowed", "a design of kind %s has no %s", design_kind_names[kind],
+                       key);
+    }
 }
 
 static void read_kind(const struct reader *in, struct design *d)
@@ -199,10 +234,17 @@ static void read_kind(const struct reader *in, struct design *d)
     for (int k = 0; value != NULL && k < DESIGN_KIND_COUNT; k++) {
         if (strcmp(json_string(value), design_kind_names[k]) != 0) continue;
         d->kind = (enum design_kind)k;
+        refuse_unheeded(in, d->kind);
         return;
     }
     doc_faults_add(in->faults, "/design/kind", value == NULL ? "missing" : "not_allowed",
                    "kind is one of full, central_composite, sobol, halton, morris");
+}
+
+static size_t factors_of(const struct reader *plan)
+{
+    const struct json *list = json_member(plan->object, "factors");
+    return list != NULL && json_type_of(list) == JSON_ARRAY ? json_count(list) : 0;
 }
 
 static void read_rule(const struct reader *plan, struct design *d)
@@ -218,7 +260,7 @@ static void read_rule(const struct reader *plan, struct design *d)
     }
     refuse_unknown(&in, known);
     read_kind(&in, d);
-    read_fraction(&in, d);
+    read_fraction(&in, factors_of(plan), d);
     read_number(&in, "axial", 0.01, 10, false, &axial);
     read_number(&in, "points", 1, DESIGN_ROWS_MAX, true, &points);
     read_number(&in, "skip", 0, DESIGN_ROWS_MAX, true, &skip);
@@ -273,6 +315,13 @@ static void read_base(const struct reader *in, const struct case_doc_defaults *d
     add_case_faults(in->faults, &found, &plan->design);
 }
 
+static bool is_response(const struct study_plan *plan, int response)
+{
+    for (int i = 0; i < plan->response_count; i++)
+        if (plan->response[i] == response) return true;
+    return false;
+}
+
 static void read_responses(const struct reader *in, struct study_plan *plan)
 {
     const struct json *list = member_of_type(in, "responses", JSON_ARRAY);
@@ -284,8 +333,10 @@ static void read_responses(const struct reader *in, struct study_plan *plan)
     for (const struct json *m = json_first(list); m != NULL; m = json_next(m)) {
         const char *name = json_type_of(m) == JSON_STRING ? json_string(m) : "";
         const int found = study_response_find(name);
-        if (found < 0 || plan->response_count == STUDY_RESPONSES_MAX) {
+        if (found < 0) {
             doc_faults_add(in->faults, "/responses", "unknown", "\"%s\" is not a response", name);
+        } else if (is_response(plan, found)) {
+            doc_faults_add(in->faults, "/responses", "duplicate", "%s is a response already", name);
         } else {
             plan->response[plan->response_count++] = found;
         }

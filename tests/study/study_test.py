@@ -107,6 +107,30 @@ class Designs(InTemporaryFolder):
         for word in ("/design/kind", "/design/sede", "eps_mux", "muX", "/factors/1", "R2 is"):
             self.assertIn(word, said)
 
+    def test_what_would_not_be_heeded_is_refused(self):
+        design = self.design(
+            design={
+                "kind": "full",
+                "points": 3,
+                "axial": 2,
+                "fraction": {"modulus": 2, "generators": [[1, 1, 1]]},
+            },
+            factors=[
+                {"key": "F", "levels": [200, 300], "max": 400},
+                {"key": "R1", "levels": [5, 7]},
+            ],
+            responses=["eps_max", "E_comp_max", "eps_max"],
+        )
+        said = run("factorial", design, "--points", status=2).stderr
+        for word in (
+            "/design/points",
+            "/design/axial",
+            "/design/fraction",
+            "/factors/0",
+            "eps_max is a response already",
+        ):
+            self.assertIn(word, said)
+
     def test_model_options_are_factors_and_constants(self):
         design = self.design(
             factors=[
