@@ -112,6 +112,14 @@ static void print_sources(FILE *out, const struct ischia_uncertainty *u)
     (void)fprintf(out, "\n");
 }
 
+static void print_shares(FILE *out, const struct ischia_uncertainty *u)
+{
+    if (isnan(u->share_shear) || isnan(u->share_compression)) return;
+    (void)fprintf(out,
+                  "            samples over the threshold: shear %.0f %%, compression %.0f %%\n",
+                  100 * u->share_shear, 100 * u->share_compression);
+}
+
 /* Medians, and between which two numbers nine samples in ten lie. */
 static void print_uncertainty(FILE *out, const struct ischia_uncertainty *u)
 {
@@ -123,9 +131,7 @@ static void print_uncertainty(FILE *out, const struct ischia_uncertainty *u)
     print_interval(out, "(median and", "shear", " mm³", 0, u->quantile[UNCERTAIN_VOLUME_SHEAR]);
     print_interval(out, "5 to 95 %)", "compression", " mm³", 0,
                    u->quantile[UNCERTAIN_VOLUME_COMPRESSION]);
-    (void)fprintf(out,
-                  "            samples over the threshold: shear %.0f %%, compression %.0f %%\n",
-                  100 * u->share_shear, 100 * u->share_compression);
+    print_shares(out, u);
     print_sources(out, u);
     (void)fprintf(out, "            beside it: error of the model's form, %.3f in eps_max\n",
                   ISCHIA_MODEL_FORM_EPS_MAX);

@@ -327,15 +327,22 @@ static const char *list_inputs(const struct report *r, const double *share, doub
     return text;
 }
 
-static void put_certainty(const struct report *r, const struct ischia_uncertainty *u)
+static void put_shares(const struct report *r, const struct ischia_uncertainty *u)
 {
-    char list[160], shear[WORDS_NUMBER_BYTES + 8], compression[WORDS_NUMBER_BYTES + 8];
+    char shear[WORDS_NUMBER_BYTES + 8], compression[WORDS_NUMBER_BYTES + 8];
+    if (isnan(u->share_shear) || isnan(u->share_compression)) return;
     put_percent(r, u->share_shear, shear);
     put_percent(r, u->share_compression, compression);
-    page_put(r->out, "<p>");
     page_fill(r->out, r->language, WORD_UNCERTAIN_SHARE,
               WORDS(word_text("shear", shear), word_text("compression", compression)));
     page_put(r->out, " ");
+}
+
+static void put_certainty(const struct report *r, const struct ischia_uncertainty *u)
+{
+    char list[160];
+    page_put(r->out, "<p>");
+    put_shares(r, u);
     page_fill(r->out, r->language, WORD_UNCERTAIN_MODEL_FORM,
               WORDS(word_number("error", ISCHIA_MODEL_FORM_EPS_MAX, 6)));
     if (list_inputs(r, u->total, 0.05, true, list, sizeof list)[0] != '\0') {

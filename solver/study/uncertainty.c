@@ -236,19 +236,30 @@ static double quantile_of(const double *sorted, int n, double probability)
     return sorted[k] + (place - k) * (next - sorted[k]);
 }
 
+/* An emulator without the quantity says nothing of it: its samples are all NaN. */
+static bool is_known(const struct samples *s, enum uncertain_quantity quantity)
+{
+    return !isnan(s->value[quantity][0]);
+}
+
+static void fill_shares(const struct samples *s, struct ischia_uncertainty *u)
+{
+    const bool shear = is_known(s, UNCERTAIN_E_SHEAR), compression = is_known(s, UNCERTAIN_E_COMP);
+    const double n = s->inside;
+    if (shear) u->share_shear = s->shear / n;
+    if (compression) u->share_compression = s->compression / n;
+    if (shear && compression) u->share_both = s->both / n;
+}
+
 static void fill_quantiles(struct samples *s, struct ischia_uncertainty *u)
 {
-    const double n = s->inside;
     for (int q = 0; q < UNCERTAIN_COUNT; q++) {
-        if (isnan(s->value[q][0])) continue;
+        if (!is_known(s, (enum uncertain_quantity)q)) continue;
         qsort(s->value[q], (size_t)s->inside, sizeof(double), compare);
         for (int k = 0; k < UNCERTAINTY_QUANTILES; k++)
             u->quantile[q][k] = quantile_of(s->value[q], s->inside, uncertainty_probabilities[k]);
     }
-    u->share_shear = s->shear / n;
-    u->share_compression = s->compression / n;
-    u->share_both = s->both / n;
-    u->emulator_sd = sqrt(s->emulator_variance / n);
+    u->emulator_sd = sqrt(s->emulator_variance / s->inside);
 }
 
 /* ------------------------------------------------------------------------------ checks */
@@ -408,6 +419,7 @@ static void evaluate(const struct tied *t, uint64_t seed, struct samples *s,
         choose_checks(t, s, u);
         fill_sensitivity(t, seed, u);
     }
+    fill_shares(s, u);
     fill_quantiles(s, u);
 }
 

@@ -70,7 +70,8 @@ struct ischia_uncertainty {
     double outside[ISCHIA_PARAM_COUNT];
     /* NaN without an interval; a force that the threshold is not reached by is NaN too */
     double quantile[UNCERTAIN_COUNT][UNCERTAINTY_QUANTILES];
-    double share_shear, share_compression, share_both; /* of samples that cross the thresholds */
+    /* Of samples that cross the thresholds; NaN also where the emulator lacks the strain. */
+    double share_shear, share_compression, share_both;
     /* Sobol' indices of eps_max; NaN when it does not vary, or too few samples are inside */
     double first_order[ISCHIA_PARAM_COUNT], total[ISCHIA_PARAM_COUNT];
     double emulator_sd; /* of eps_max, root mean square over the samples; NaN without an interval */

@@ -73,7 +73,15 @@ def write_emulator(path, **changes):
                 "held_out_rms": 0,
                 "mean": eps_max_terms(),
                 "spread": [term(0)],
-            }
+            },
+            {
+                "name": "E_shear_max",
+                "power": 1,
+                "reach": 0.2,
+                "held_out_rms": 0,
+                "mean": [term(0.75)],
+                "spread": [term(0)],
+            },
         ],
     }
     body = json.dumps(document) + "\n"
@@ -153,8 +161,9 @@ class Intervals(unittest.TestCase):
         self.assertEqual(columns["uncertainty"], "given")
         for name, at in (("eps_max_q05", 0), ("eps_max_q50", 2), ("eps_max_q95", 4)):
             self.assertAlmostEqual(float(columns[name]), u["strain"]["eps_max"][at])
-        for name in ("shear", "compression", "both"):
-            self.assertEqual(float(columns["share_" + name]), u["share_crossing"][name])
+        self.assertEqual(float(columns["share_shear"]), u["share_crossing"]["shear"])
+        for name in ("compression", "both"):  # the emulator has no compression
+            self.assertEqual((columns["share_" + name], u["share_crossing"][name]), ("", None))
         total = u["sensitivity"]["total"]
         best = max(total, key=lambda k: total[k])
         self.assertEqual(columns["measure_better"], best)

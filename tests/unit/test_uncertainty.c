@@ -166,7 +166,7 @@ static void shares_and_forces_know_the_thresholds(void **state)
     c.param[ISCHIA_F] = 250; /* half of the samples carry less than the crossing force */
     const struct ischia_uncertainty u = compute(&p, &c, sd, 0, 1);
     near(u.share_shear, 0.5, 0.01);
-    assert_true(u.share_compression == 0 && u.share_both == 0); /* never in this emulator */
+    assert_true(isnan(u.share_compression) && isnan(u.share_both)); /* not in this emulator */
     near(u.quantile[UNCERTAIN_FORCE_SHEAR][1], 250, 1e-9);
     assert_true(isnan(u.quantile[UNCERTAIN_FORCE_SHEAR][3])); /* not reached */
     predictor_finish(&p);

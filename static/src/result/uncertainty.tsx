@@ -15,6 +15,7 @@ interface Row {
   unit: string;
   decimals: number;
   of: (u: Uncertainty) => Quantiles;
+  absent?: Key; /* what a missing number means; else the emulator does not know it */
 }
 
 const rows: readonly Row[] = [
@@ -32,13 +33,27 @@ const rows: readonly Row[] = [
     of: (u) => u.clusters.compression.volume_mm3,
   },
   { key: 'numbers.v_both', unit: 'mm³', decimals: 0, of: (u) => u.clusters.both.volume_mm3 },
-  { key: 'numbers.f_shear', unit: 'N', decimals: 1, of: (u) => u.threshold_force_N.shear },
-  { key: 'numbers.f_comp', unit: 'N', decimals: 1, of: (u) => u.threshold_force_N.compression },
+  {
+    key: 'numbers.f_shear',
+    unit: 'N',
+    decimals: 1,
+    of: (u) => u.threshold_force_N.shear,
+    absent: 'uncertain.not_reached',
+  },
+  {
+    key: 'numbers.f_comp',
+    unit: 'N',
+    decimals: 1,
+    of: (u) => u.threshold_force_N.compression,
+    absent: 'uncertain.not_reached',
+  },
 ];
 
 function Table(props: { of: Uncertainty; label: string }) {
-  const cell = (v: number | null, row: Row): string =>
-    v === null ? t('uncertain.not_reached') : format_fixed(v, row.decimals);
+  const cell = (v: number | null, row: Row): string => {
+    if (v === null) return row.absent ? t(row.absent) : '–';
+    return format_fixed(v, row.decimals);
+  };
   return (
     <div class="scroll" tabIndex={0} role="group" aria-label={props.label}>
       <table class="numbers small">
@@ -138,12 +153,14 @@ function Given(props: { of: Uncertainty; inputs: ParameterInfo[]; label: string 
     <>
       <p class="hint">{t('uncertain.note', { list: deviations(u, inputs), n: u.samples })}</p>
       <Table of={u} label={props.label} />
-      <p>
-        {t('uncertain.share', {
-          shear: format_percent(shear ?? 0),
-          compression: format_percent(compression ?? 0),
-        })}
-      </p>
+      {shear !== null && compression !== null && (
+        <p>
+          {t('uncertain.share', {
+            shear: format_percent(shear),
+            compression: format_percent(compression),
+          })}
+        </p>
+      )}
       <p>{t('uncertain.model_form', { error: u.model_form_error.eps_max })}</p>
       {u.inside < u.samples && (
         <p class="warning">
