@@ -59,13 +59,6 @@ build() {
   ninja -C "$dir"
 }
 
-# What tests write goes to a folder in memory, where it has room: they wait for the disk longer than
-# they compute, and what a kill leaves is the same there.
-if [[ -z ${TMPDIR:-} && -w /dev/shm ]] &&
-  (($(df --output=avail --block-size=1M /dev/shm | tail -n 1) >= 4096)); then
-  export TMPDIR=/dev/shm
-fi
-
 # Many tests wait (for a browser, a lease, a kill): one more at once than there are processors.
 processes=$(($(nproc) + 1))
 logs=() status=0
